@@ -45,10 +45,7 @@ DEFECTS = (
         "or due is None or any(n > len(data) for n in due):",
         "and True:",
         "A reply that ends with a zero is truncated, and its values are lost.",
-        (
-            "tests/wire/test_heard.py"
-            "::test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it",
-        ),
+        ("tests/wire/test_heard.py::test_reply_complete_without_its_last_byte_includes_it",),
     ),
     Defect(
         "late-reply-of-another-device",
@@ -56,7 +53,7 @@ DEFECTS = (
         "frame.device != requested.device or frame.function",
         "frame.function",
         "A late reply of one drive is shown as the values of another.",
-        ("tests/wire/test_heard.py::test_results_of_requests",),
+        ("tests/wire/test_heard.py::test_requests_have_their_results",),
     ),
     Defect(
         "write-again-taken-for-its-reply",
@@ -64,7 +61,7 @@ DEFECTS = (
         "and not _repeated(requested, frame)\n",
         "\n",
         "A drive that answers nothing is reported as accepting its commands.",
-        ("tests/wire/test_heard.py::test_a_write_that_is_sent_again_is_no_reply",),
+        ("tests/wire/test_heard.py::test_repeated_write_is_not_a_reply",),
     ),
     Defect(
         "second-answer-not-told",

@@ -20,20 +20,20 @@ def read(address: int, count: int) -> str:
 # Unknown, protected and read-only words
 
 
-def test_unknown_words_read_16_8000_beside_known_ones_on_atv71() -> None:
+def test_atv71_unknown_words_read_16_8000_next_to_known_ones() -> None:
     bench = Bench("atv71", {"CHCF": 1, "COP": 2})
     assert bench.ask(read(8400, 3)) == "0306800000010002"
 
 
-def test_only_unknown_words_are_exception_2_on_atv71() -> None:
+def test_atv71_read_of_unknown_words_only_is_exception_2() -> None:
     assert Bench("atv71").ask(read(4000, 3)) == "8302"
 
 
-def test_any_unknown_word_is_exception_2_where_gaps_cannot_be_read() -> None:
+def test_any_unknown_word_is_exception_2_if_gaps_are_unreadable() -> None:
     assert Bench("atv312").ask(read(8400, 3)) == "8302"
 
 
-def test_protected_words_are_unknown_to_the_line_for_reading_and_writing() -> None:
+def test_protected_words_cannot_be_read_or_written_over_the_line() -> None:
     bench = Bench("atv71", protects=frozenset({"ACC"}))
     assert bench.ask(read(9001, 2)) == "03048000001E"
     assert bench.write("ACC", 5) == "8602"
@@ -44,11 +44,11 @@ def test_protected_words_are_unknown_to_the_line_for_reading_and_writing() -> No
     ("profile", "code", "answer"),
     [("atv71", "ETA", "8604"), ("atv312", "ETA", "8604"), ("atv21", "FD00", "8602")],
 )
-def test_a_read_only_word_refuses_as_the_family_does(profile: str, code: str, answer: str) -> None:
+def test_read_only_word_refuses_like_its_family(profile: str, code: str, answer: str) -> None:
     assert Bench(profile).write(code, 1) == answer
 
 
-def test_leroy_somer_is_silent_where_others_answer_an_exception() -> None:
+def test_leroy_somer_is_silent_instead_of_an_exception() -> None:
     """Its manual documents no exception; silence is what it says for other refusals."""
     bench = Bench("powerdrive")
     assert bench.write("10.40", 1) is None
@@ -59,14 +59,14 @@ def test_leroy_somer_is_silent_where_others_answer_an_exception() -> None:
 # Values
 
 
-def test_a_value_out_of_range_is_exception_3_and_changes_nothing() -> None:
+def test_value_out_of_range_is_exception_3_and_not_written() -> None:
     bench = Bench("atv71")
     assert bench.write("SFR", 161) == "8603"
     assert bench.write("COP", 4) == "8603"
     assert bench.word("SFR") == 40
 
 
-def test_a_value_past_another_parameter_is_cut_on_altivar_71_and_refused_on_21() -> None:
+def test_value_beyond_another_parameter_is_clamped_on_71_and_refused_on_21() -> None:
     bench = Bench("atv71")
     bench.taken("HSP", 8000)
     assert bench.word("HSP") == 600
@@ -80,7 +80,7 @@ def test_an_unknown_address_refuses_the_whole_request() -> None:
     assert bench.word("ACC") == 30
 
 
-def test_a_word_that_cannot_go_on_refuses_the_rest() -> None:
+def test_refused_word_ends_a_multiple_write() -> None:
     bench = Bench("atv71", {"NCA1": 9001, "NCA2": 3201, "NCA3": 9002})
     assert bench.ask(struct.pack(">BHHBHHH", 16, 12761, 3, 6, 11, 1, 33).hex()) == "9004"
     assert (bench.word("ACC"), bench.word("DEC")) == (11, 30)
@@ -111,7 +111,7 @@ def test_a_busy_drive_refuses_writes_and_answers_reads() -> None:
 # Memory
 
 
-def test_words_in_memory_only_are_lost_at_power_down() -> None:
+def test_volatile_words_are_lost_at_power_down() -> None:
     bench = Bench("atv21")
     bench.taken("FA01", 3000)
     bench.taken("ACC", 77)
@@ -121,7 +121,7 @@ def test_words_in_memory_only_are_lost_at_power_down() -> None:
 
 
 @pytest.mark.parametrize(("code", "raw"), [("CMI", 2), ("SCS", 1)])
-def test_altivar_71_keeps_what_was_saved_by_command(code: str, raw: int) -> None:
+def test_altivar_71_keeps_settings_saved_by_command(code: str, raw: int) -> None:
     bench = Bench("atv71")
     bench.taken("ACC", 44)
     bench.drive.power_cycle()
@@ -133,7 +133,7 @@ def test_altivar_71_keeps_what_was_saved_by_command(code: str, raw: int) -> None
     assert bench.word("ACC") == 44
 
 
-def test_nothing_can_be_written_while_the_eeprom_is() -> None:
+def test_nothing_can_be_written_during_an_eeprom_save() -> None:
     bench = Bench("atv71")
     bench.taken("CMI", 2)
     assert bench.word("ETI") & 1
@@ -152,7 +152,7 @@ def test_a_running_drive_does_not_save() -> None:
     assert bench.word("ACC") == 30
 
 
-def test_factory_settings_come_back_by_command_but_not_those_of_the_line() -> None:
+def test_factory_reset_keeps_line_settings() -> None:
     bench = Bench("atv71")
     bench.taken("ACC", 44)
     bench.taken("TBR", 28)
@@ -161,7 +161,7 @@ def test_factory_settings_come_back_by_command_but_not_those_of_the_line() -> No
     assert bench.word("TBR") == 28
 
 
-def test_settings_after_reset_are_read_back_at_once_and_act_later() -> None:
+def test_settings_after_reset_are_read_back_immediately_but_apply_later() -> None:
     bench = Bench("atv21", {"F875": 2, "F876": 2})
     bench.taken("F875", 5)
     assert bench.word("F875") == 5
@@ -172,7 +172,7 @@ def test_settings_after_reset_are_read_back_at_once_and_act_later() -> None:
     assert bench.ask(read(0x1875, 2)) != frequency_first
 
 
-def test_an_address_after_reset_waits_for_the_power_cycle() -> None:
+def test_address_after_reset_applies_after_the_power_cycle() -> None:
     bench = Bench("atv71")
     bench.taken("ADD", 9)
     assert bench.drive.address == 2
@@ -181,7 +181,7 @@ def test_an_address_after_reset_waits_for_the_power_cycle() -> None:
     assert bench.drive.address == 9
 
 
-def test_an_address_at_once_acts_at_once() -> None:
+def test_immediate_address_applies_immediately() -> None:
     bench = Bench("atv21")
     bench.taken("F802", 9)
     assert bench.drive.address == 9
@@ -190,25 +190,25 @@ def test_an_address_at_once_acts_at_once() -> None:
 # Values from power-up
 
 
-def test_a_monitored_word_that_was_set_stays() -> None:
+def test_monitored_word_keeps_its_set_value() -> None:
     bench = Bench("atv21", {"FD00": 1234}, run_hz=40.0)
     bench.run(5)
     assert bench.word("FD00") == 1234
     assert bench.word("FE05") > 0, "others still follow the motor"
 
 
-def test_sets_take_codes_numbers_addresses_and_both_notations_of_a_sign() -> None:
+def test_set_option_accepts_codes_numbers_addresses_and_signs() -> None:
     bench = Bench("atv71", {"acc": 7, "W9002": 8, "16#219A": 0xFFFF, "LFR": -5})
     assert [bench.drive.raw(c) for c in ("ACC", "DEC", "LFRD", "LFR")] == [7, 8, -1, -5]
 
 
-def test_sets_survive_a_power_cycle() -> None:
+def test_set_values_survive_a_power_cycle() -> None:
     bench = Bench("atv71", {"ACC": 7})
     bench.drive.power_cycle()
     assert bench.word("ACC") == 7
 
 
-def test_wrong_sets_are_reported() -> None:
+def test_invalid_set_options_are_reported() -> None:
     with pytest.raises(UnknownParameter):
         SimulatedDrive(PROFILES["atv71"], DriveSpec("atv71", sets={"NOPE": 1}))
     with pytest.raises(SimulatorError, match="does not fit"):
@@ -218,7 +218,7 @@ def test_wrong_sets_are_reported() -> None:
 # Indirect blocks
 
 
-def test_single_words_only_with_exception_3_otherwise() -> None:
+def test_read_of_several_words_is_exception_3_on_single_word_drives() -> None:
     bench = Bench("atv21")
     assert bench.ask(read(0xFD00, 1)) == "03020000"
     assert bench.ask(read(0xFD00, 2)) == "8303"
@@ -226,11 +226,11 @@ def test_single_words_only_with_exception_3_otherwise() -> None:
     assert bench.ask(read(0xFFFF, 1)) == "8302"
 
 
-def test_a_read_block_shows_no_value_where_nothing_is_selected() -> None:
+def test_unassigned_read_block_slot_has_no_value() -> None:
     assert Bench("atv21", {"F875": 2}).ask(read(0x1875, 2)) == "030400008000"
 
 
-def test_a_write_block_needs_both_places_selected() -> None:
+def test_write_block_needs_both_slots_assigned() -> None:
     write = struct.pack(">BHHBHH", 16, 0x1870, 2, 4, 0xC400, 1000).hex()
     assert Bench("atv21", {"F870": 1}).ask(write) == "9004"
     bench = Bench("atv21", {"F870": 1, "F871": 3})
@@ -241,7 +241,7 @@ def test_a_write_block_needs_both_places_selected() -> None:
 # Communication scanner
 
 
-def test_the_scanner_shows_live_words_and_writes_through() -> None:
+def test_scanner_reads_live_words_and_writes_through() -> None:
     bench = Bench("atv71", {"NMA1": 9001, "NMA2": 4000, "NMA3": 0, "NCA1": 9001})
     bench.taken("ACC", 55)
     assert bench.ask(read(12741, 3)) == "0306003780000000"

@@ -19,7 +19,7 @@ COMBINED_BY_LI5 = {"CHCF": 1, "FR1": 164, "FR2": 1, "RFC": 133}
 
 
 @pytest.mark.parametrize("family", COMPACT)
-def test_an_idle_drive_set_up_for_modbus_says_so_in_eti(family: str) -> None:
+def test_idle_drive_set_up_for_modbus_reports_it_in_eti(family: str) -> None:
     Exchange(family).play(f"""
         > 02 03 {ETA} 0001
         < 02 03 02 0240          # no forced local, switch on disabled
@@ -30,7 +30,7 @@ def test_an_idle_drive_set_up_for_modbus_says_so_in_eti(family: str) -> None:
     """)
 
 
-def test_an_idle_atv71_set_up_for_modbus_says_so_in_ccc_and_crc() -> None:
+def test_idle_atv71_set_up_for_modbus_reports_it_in_ccc_and_crc() -> None:
     Exchange("atv71").play(f"""
         > 02 03 {CRC} 0002
         < 02 03 04 0008 0008
@@ -40,7 +40,7 @@ def test_an_idle_atv71_set_up_for_modbus_says_so_in_ccc_and_crc() -> None:
 
 
 @pytest.mark.parametrize("family", ALL)
-def test_li5_takes_command_and_reference_to_the_terminals_and_back(family: str) -> None:
+def test_li5_switches_command_and_reference_to_the_terminals_and_back(family: str) -> None:
     """ATV71 manual, configuration: Fr1 = Modbus, Fr2 = AI1, rFC = LI5, combined."""
     rig = Exchange(family, COMBINED_BY_LI5)
     rig.play(f"""
@@ -196,7 +196,7 @@ def test_on_the_atv71_reference_1b_is_switched_alone() -> None:
     """)
 
 
-def test_in_the_io_profile_li5_hands_over_and_the_word_holds_again_afterwards() -> None:
+def test_io_profile_li5_switches_and_the_word_applies_again_afterwards() -> None:
     """ATV71 manual: control via Modbus or the terminals in I/O profile."""
     settings = {"CHCF": 3, "FR1": 164, "CD1": 10, "CD2": 1, "CCS": 133, "FR1B": 1, "RCB": 133}
     Exchange("atv71", settings).play(f"""
@@ -261,7 +261,7 @@ def test_forced_local_beats_the_channels_and_shows_in_bit_9(family: str) -> None
 
 
 @pytest.mark.parametrize("family", ALL)
-def test_a_silent_line_trips_no_drive_that_is_forced_local(family: str) -> None:
+def test_communication_loss_does_not_trip_a_forced_local_drive(family: str) -> None:
     rig = Exchange(family, {"FLO": 134, "FLOC": 1, "TTO": 10, "SLL": 1})
     rig.play(f"""
         > 02 06 {LFR} 012C
@@ -278,12 +278,12 @@ def test_a_silent_line_trips_no_drive_that_is_forced_local(family: str) -> None:
 
 
 @pytest.mark.parametrize("family", COMPACT)
-def test_the_display_and_canopen_show_in_bits_13_and_14_of_eti(family: str) -> None:
+def test_bits_13_and_14_of_eti_show_display_and_canopen(family: str) -> None:
     for channel, bits in ((163, 0x2000), (167, 0x6000), (1, 0)):
         assert Exchange(family, {"FR1": channel}).word("ETI") & 0x6000 == bits
 
 
-def test_three_wires_start_by_a_pulse_and_not_again_by_themselves() -> None:
+def test_three_wire_control_starts_on_a_pulse_only() -> None:
     Exchange("atv312", {"FR1": 1, "TCC": 1}).play(f"""
         @ AI1=5V
         @ LI1=1
@@ -319,12 +319,14 @@ def test_three_wires_start_by_a_pulse_and_not_again_by_themselves() -> None:
         (203, (), 0x0800, False),
     ],
 )
-def test_meaning_of_an_assignment(raw: int, closed: tuple[str, ...], word: int, on: bool) -> None:
+def test_assignment_value_selects_an_input_or_a_bit(
+    raw: int, closed: tuple[str, ...], word: int, on: bool
+) -> None:
     """96 to 99 channels, from 129 inputs, from 160 bits of the line's word; 203 is CANopen's."""
     assert switch_is_on(raw, lambda name: name in closed, word) is on
 
 
-def test_channels_of_a_drive_without_any_setting_are_those_of_the_terminals() -> None:
+def test_default_channels_are_the_terminals() -> None:
     channels = channels_in_force(lambda code, default: default, lambda raw: raw in (97, 99))
     assert (channels.command, channels.reference) == (
         ChannelPlace.TERMINALS,

@@ -48,7 +48,7 @@ def test_without_priority_the_sources_decide() -> None:
     assert bench.word("FD00") == 3000
 
 
-def test_reverse() -> None:
+def test_reverse_bit_reverses_the_motor() -> None:
     bench = started()
     bench.taken("FA00", RUN_REVERSE)
     bench.run(7)
@@ -57,7 +57,7 @@ def test_reverse() -> None:
     assert bench.drive.motor.frequency == pytest.approx(-30)
 
 
-def test_a_coast_stop_lets_go_of_the_motor() -> None:
+def test_coast_stop_disables_the_output() -> None:
     bench = started()
     bench.run(7)
     bench.taken("FA00", RUN_FORWARD | 0x0800)
@@ -67,7 +67,7 @@ def test_a_coast_stop_lets_go_of_the_motor() -> None:
     assert bench.word("FD01") & 1 << 11
 
 
-def test_preset_speeds_go_before_the_reference() -> None:
+def test_preset_speeds_override_the_reference() -> None:
     bench = started()
     bench.taken("FA00", RUN_FORWARD | 2)
     assert bench.word("FE46") == 255
@@ -99,7 +99,7 @@ def test_a_reset_needs_the_command_and_an_edge() -> None:
     assert bench.word("FE10") == 1
 
 
-def test_words_before_the_fault_stay_while_it_is_present() -> None:
+def test_pre_fault_words_stay_during_the_fault() -> None:
     bench = started()
     bench.run(7)
     running = bench.word("FD01")
@@ -111,7 +111,7 @@ def test_words_before_the_fault_stay_while_it_is_present() -> None:
     assert bench.word("FE03") > 0, "values of the FE series are frozen"
 
 
-def test_the_history_moves_on() -> None:
+def test_fault_history_shifts() -> None:
     bench = Bench("atv21", UNWATCHED)
     for fault in ("OC1", "Err5"):
         bench.drive.provoke(fault)
@@ -120,7 +120,7 @@ def test_the_history_moves_on() -> None:
     assert (bench.word("FE10"), bench.word("FE11")) == (24, 1)
 
 
-def test_giving_the_command_back_hands_it_to_the_terminals() -> None:
+def test_released_command_returns_to_the_terminals() -> None:
     bench = Bench("atv21", UNWATCHED, run_hz=20.0)
     bench.run(5)
     assert bench.word("FD00") == 2000
@@ -132,7 +132,7 @@ def test_giving_the_command_back_hands_it_to_the_terminals() -> None:
     assert bench.word("FD00") == 2000, "the run order there is still given"
 
 
-def test_priorities_fall_at_power_down() -> None:
+def test_priority_bits_are_lost_at_power_down() -> None:
     bench = started()
     bench.run(2)
     bench.drive.power_cycle()

@@ -18,7 +18,7 @@ def started(profile: str = "atv71", **more: object) -> Bench:
     return bench
 
 
-def test_the_walk_to_operation_enabled_shows_the_words_of_the_manual_on_atv71() -> None:
+def test_atv71_start_sequence_has_the_status_words_of_the_manual() -> None:
     bench = Bench("atv71")
     bench.taken("LFR", 500)
     assert bench.word("ETA") == 0x0250
@@ -32,7 +32,7 @@ def test_the_walk_to_operation_enabled_shows_the_words_of_the_manual_on_atv71() 
     assert bench.word("RFR") == 500
 
 
-def test_the_same_walk_without_the_power_bit_on_atv312() -> None:
+def test_atv312_start_sequence_has_no_power_bit() -> None:
     bench = Bench("atv312")
     bench.taken("LFR", 500)
     seen = []
@@ -69,7 +69,7 @@ def test_a_negative_reference_reverses_and_bit_11_turns_it_back() -> None:
     ("command", "status"),
     [(0x0006, 0x0231), (0x0000, 0x0250), (0x000D, 0x0250)],
 )
-def test_shutdown_and_disable_voltage_freewheel_at_once(command: int, status: int) -> None:
+def test_shutdown_and_disable_voltage_coast_immediately(command: int, status: int) -> None:
     bench = started()
     bench.run(3)
     bench.taken("CMD", command)
@@ -79,7 +79,7 @@ def test_shutdown_and_disable_voltage_freewheel_at_once(command: int, status: in
     assert bench.drive.motor.rotor > 20, "the motor coasts"
 
 
-def test_disable_operation_stops_on_the_ramp_and_then_leaves_enabled() -> None:
+def test_disable_operation_ramps_down_then_leaves_enabled() -> None:
     bench = started()
     bench.run(3)
     bench.taken("CMD", 7)
@@ -91,7 +91,7 @@ def test_disable_operation_stops_on_the_ramp_and_then_leaves_enabled() -> None:
     assert not bench.drive.motor.energised
 
 
-def test_enabling_again_while_the_ramp_runs_down_goes_on() -> None:
+def test_enable_during_the_ramp_down_continues_running() -> None:
     bench = started()
     bench.run(3)
     bench.taken("CMD", 7)
@@ -133,7 +133,7 @@ def test_commands_out_of_order_change_nothing() -> None:
         assert bench.word("ETA") & 0x6F == 0x40
 
 
-def test_enable_from_ready_is_taken_on_atv71_and_not_on_atv312() -> None:
+def test_enable_from_ready_works_on_atv71_but_not_on_atv312() -> None:
     for profile, state in (("atv71", 0x27), ("atv312", 0x21)):
         bench = Bench(profile)
         bench.taken("CMD", 6)
@@ -141,7 +141,7 @@ def test_enable_from_ready_is_taken_on_atv71_and_not_on_atv312() -> None:
         assert bench.word("ETA") & 0x6F == state
 
 
-def test_below_access_level_3_an_enable_starts_the_drive_at_once() -> None:
+def test_enable_below_access_level_3_starts_immediately() -> None:
     bench = Bench("atv312", {"LAC": 0})
     bench.taken("LFR", 300)
     assert bench.word("ETA") & 0x6F == 0x27, "enabled by itself at power-up"
@@ -152,7 +152,7 @@ def test_below_access_level_3_an_enable_starts_the_drive_at_once() -> None:
     assert bench.word("RFR") == 300
 
 
-def test_a_configuration_write_takes_ready_back_to_disabled_on_atv312() -> None:
+def test_atv312_configuration_write_returns_from_ready_to_disabled() -> None:
     for profile, state in (("atv312", 0x40), ("atv71", 0x21)):
         bench = Bench(profile)
         bench.taken("CMD", 6)
@@ -163,7 +163,7 @@ def test_a_configuration_write_takes_ready_back_to_disabled_on_atv312() -> None:
 # Channels and references
 
 
-def test_the_line_does_not_command_where_the_channel_is_another() -> None:
+def test_line_without_the_command_channel_has_no_effect() -> None:
     bench = Bench("atv71", {"FR1": 1})
     for command in (6, 7, 15):
         bench.taken("CMD", command)
@@ -178,7 +178,7 @@ def test_with_separate_channels_the_command_follows_cd1() -> None:
         assert bench.word("ETA") & 0x6F == state
 
 
-def test_the_reference_written_last_counts_and_is_kept_between_low_and_high_speed() -> None:
+def test_last_reference_applies_within_low_and_high_speed() -> None:
     bench = started()
     bench.taken("LFRD", 600)
     bench.run(3)
@@ -202,7 +202,7 @@ def test_ramps_follow_their_increment() -> None:
     assert bench.word("RFR") == pytest.approx(250, abs=3), "10 s, not 1.0 s"
 
 
-def test_high_resolution_counts_in_32767ths() -> None:
+def test_high_resolution_reference_is_in_32767ths() -> None:
     bench = Bench("atv71", {"TFR": 600})
     bench.taken("CMI", 0x0200)
     bench.taken("LFR", 32767 // 2)
@@ -216,7 +216,7 @@ def test_high_resolution_counts_in_32767ths() -> None:
 # What another master, or the terminals, ordered before
 
 
-def test_a_motor_that_another_master_left_running_is_taken_over_without_a_bump() -> None:
+def test_motor_left_running_by_another_master_is_taken_over_smoothly() -> None:
     bench = Bench("atv71", run_hz=40.0)
     bench.run(5)
     assert bench.word("RFR") == 400
@@ -233,7 +233,7 @@ def test_a_motor_that_another_master_left_running_is_taken_over_without_a_bump()
     assert bench.word("ETA") & 0x6F == 0x23
 
 
-def test_the_end_of_the_order_at_the_terminals_stops_on_the_ramp() -> None:
+def test_removed_terminal_command_stops_on_the_ramp() -> None:
     bench = Bench("atv71", {"FR1": 1}, run_hz=40.0)
     bench.run(5)
     bench.drive.halt()
@@ -246,7 +246,7 @@ def test_the_end_of_the_order_at_the_terminals_stops_on_the_ramp() -> None:
 # Faults
 
 
-def test_a_fault_stops_the_motor_and_is_shown_until_an_edge_of_bit_7() -> None:
+def test_fault_stops_the_motor_until_a_rising_edge_of_bit_7() -> None:
     bench = started()
     bench.run(3)
     bench.drive.provoke("obf")
@@ -264,7 +264,7 @@ def test_a_fault_stops_the_motor_and_is_shown_until_an_edge_of_bit_7() -> None:
     assert bench.word("RFR") == 0, "nothing starts by itself"
 
 
-def test_bit_7_needs_an_edge() -> None:
+def test_fault_reset_needs_an_edge_of_bit_7() -> None:
     bench = Bench("atv71")
     bench.taken("CMD", 0x80)
     bench.drive.provoke("ObF")
@@ -290,7 +290,7 @@ def test_a_fault_whose_cause_is_still_there_cannot_be_reset() -> None:
 
 
 @pytest.mark.parametrize(("profile", "history"), [("atv71", (9, 18)), ("atv312", (18, 0))])
-def test_the_history_moves_on(profile: str, history: tuple[int, int]) -> None:
+def test_fault_history_shifts(profile: str, history: tuple[int, int]) -> None:
     """On the ATV71 it begins with the last fault, on the ATV312 with the one before it."""
     bench = Bench(profile)
     for fault in ("ObF", "OCF"):
@@ -306,7 +306,7 @@ def test_the_history_moves_on(profile: str, history: tuple[int, int]) -> None:
 # I/O profile
 
 
-def test_the_io_profile_runs_by_single_bits_with_its_own_status() -> None:
+def test_io_profile_runs_by_single_bits_with_its_own_status() -> None:
     bench = Bench("atv71", {"CHCF": 3, "CD1": 10, "RSF": 167})
     bench.taken("LFR", 300)
     assert bench.word("ETA") & 0x2E == 0x22
@@ -326,7 +326,7 @@ def test_the_io_profile_runs_by_single_bits_with_its_own_status() -> None:
     assert bench.word("ETA") & 0x0E == 0x02
 
 
-def test_in_the_io_profile_6_is_an_order_and_no_shutdown() -> None:
+def test_word_6_in_the_io_profile_is_a_run_command() -> None:
     bench = Bench("atv71", {"CHCF": 3, "CD1": 10})
     bench.taken("LFR", 300)
     bench.taken("CMD", 6)
@@ -334,7 +334,7 @@ def test_in_the_io_profile_6_is_an_order_and_no_shutdown() -> None:
     assert bench.word("RFR") == 0x10000 - 300
 
 
-def test_a_fault_leaves_a_record_of_what_the_drive_did() -> None:
+def test_fault_leaves_a_record_of_the_operating_values() -> None:
     bench = started()
     bench.run(3)
     status, current = bench.word("ETA"), bench.word("LCR")
@@ -347,7 +347,7 @@ def test_a_fault_leaves_a_record_of_what_the_drive_did() -> None:
     assert bench.word("LCP0") == 0
 
 
-def test_reaching_access_level_3_gives_the_channels_their_factory_values() -> None:
+def test_access_level_3_resets_the_channels_to_factory() -> None:
     bench = Bench("atv312", {"LAC": 0, "CHCF": 2})
     bench.taken("LAC", 1)
     assert bench.word("FR1") == 164

@@ -14,7 +14,7 @@ from .bench import Bench
 READY, ACTIVE, STANDS, REACHED, REVERSE = 1, 2, 4, 1 << 5, 1 << 13
 
 
-def test_the_control_word_runs_the_motor_when_it_is_in_force() -> None:
+def test_control_word_runs_the_motor_if_enabled() -> None:
     bench = Bench("powerdrive")
     bench.taken("6.42", 0x0003)
     bench.run(1)
@@ -28,7 +28,7 @@ def test_the_control_word_runs_the_motor_when_it_is_in_force() -> None:
     assert [bench.word(c) for c in ("6.15", "6.30", "6.32", "10.06")] == [1, 1, 0, 1]
 
 
-def test_reverse_and_stop() -> None:
+def test_control_word_reverses_and_stops() -> None:
     bench = Bench("powerdrive", {"6.43": 1})
     bench.taken("6.42", 0x0009)
     bench.run(4)
@@ -39,7 +39,7 @@ def test_reverse_and_stop() -> None:
     assert bench.word("10.40") & (ACTIVE | STANDS) == STANDS
 
 
-def test_locking_the_drive_lets_go_of_the_motor() -> None:
+def test_locking_the_drive_disables_the_output() -> None:
     bench = Bench("powerdrive", {"6.43": 1})
     bench.taken("6.42", 0x0003)
     bench.run(4)
@@ -49,7 +49,7 @@ def test_locking_the_drive_lets_go_of_the_motor() -> None:
     assert bench.drive.motor.rotor > 10
 
 
-def test_the_control_word_cannot_be_put_in_force_while_the_drive_is_unlocked() -> None:
+def test_control_word_cannot_be_enabled_while_unlocked() -> None:
     bench = Bench("powerdrive", run_hz=25.0)
     bench.run(4)
     assert bench.write("6.43", 1) is None
@@ -59,7 +59,7 @@ def test_the_control_word_cannot_be_put_in_force_while_the_drive_is_unlocked() -
     bench.taken("6.43", 1)
 
 
-def test_a_fault_takes_ready_away_until_bit_13() -> None:
+def test_fault_clears_ready_until_bit_13() -> None:
     bench = Bench("powerdrive", {"6.43": 1})
     bench.taken("6.42", 0x0003)
     bench.run(4)
@@ -70,7 +70,7 @@ def test_a_fault_takes_ready_away_until_bit_13() -> None:
     assert bench.word("10.40") & READY
 
 
-def test_jogging_is_slow() -> None:
+def test_jog_runs_at_jog_speed() -> None:
     bench = Bench("powerdrive", {"6.43": 1})
     bench.taken("6.42", 0x0005)
     bench.run(4)
@@ -112,7 +112,7 @@ def test_bit_8_chooses_the_first_preset_in_rpm() -> None:
     assert after(drive, 5) == pytest.approx(30), "the analogue reference at the terminals"
 
 
-def test_no_preset_goes_past_the_maximum() -> None:
+def test_preset_does_not_exceed_the_maximum() -> None:
     drive = library_drive(**{"1.06": 900})
     assert written(drive, "1.21", 1500)
     assert written(drive, "6.42", PRESET_WORD)

@@ -25,7 +25,7 @@ def pump() -> Profile:
     return Profile(msgspec.toml.decode(text.encode(), type=ProfileData))
 
 
-def test_the_example_pump_runs_trips_by_its_time_out_and_is_reset() -> None:
+def test_example_pump_runs_trips_on_timeout_and_is_reset() -> None:
     Exchange(pump()).play("""
         > 02 03 0064 0003
         < 02 03 06 0001 0000 0000      # ready, 0.0 Hz, no fault
@@ -127,7 +127,7 @@ def words(**more: Any) -> Profile:
     )
 
 
-def test_a_drive_of_single_words_runs_stops_trips_and_is_reset() -> None:
+def test_single_word_drive_runs_stops_trips_and_is_reset() -> None:
     Exchange(words()).play("""
         > 02 03 2100 0004
         < 02 83 02                     # 8450 is in no profile
@@ -167,7 +167,7 @@ def test_a_drive_of_single_words_runs_stops_trips_and_is_reset() -> None:
     """)
 
 
-def test_an_order_whose_interlock_does_not_hold_changes_nothing() -> None:
+def test_command_with_an_unmet_interlock_has_no_effect() -> None:
     Exchange(words(), {"SOURCE": 0}).play("""
         > 02 06 2001 03E8
         > 02 06 2000 0012
@@ -182,7 +182,7 @@ def test_an_order_whose_interlock_does_not_hold_changes_nothing() -> None:
     """)
 
 
-def test_a_motor_that_another_master_left_running_is_stopped_by_the_line() -> None:
+def test_motor_left_running_by_another_master_is_stopped_by_the_line() -> None:
     Exchange(words(), run_hz=20.0).play("""
         . 1.5
         > 02 03 2001 0001
@@ -197,7 +197,7 @@ def test_a_motor_that_another_master_left_running_is_stopped_by_the_line() -> No
     """)
 
 
-def test_an_order_of_several_words_is_given_with_the_last_of_them() -> None:
+def test_command_of_several_words_applies_with_the_last_word() -> None:
     orders = [
         {"id": "forward", "name": "Forward", "words": [6, 7, 15]},
         {"id": "stop", "name": "Stop", "words": [7]},
@@ -219,7 +219,7 @@ def test_an_order_of_several_words_is_given_with_the_last_of_them() -> None:
     """)
 
 
-def test_transitions_lead_through_states_that_no_order_names() -> None:
+def test_transitions_pass_intermediate_states() -> None:
     states = [
         {"id": "fault", "name": "Fault", "kind": "fault", "mask": 8, "value": 8},
         {"id": "off", "name": "Off", "kind": "blocked", "mask": 0x40, "value": 0x40},
@@ -275,14 +275,12 @@ def states(*marks: tuple[str, int, int]) -> Chart:
         ([("first", 4, 0), ("second", 12, 4), ("wanted", 1, 1)], 13),
     ],
 )
-def test_a_status_word_tells_its_state_and_none_before_it(
-    marks: list[tuple[str, int, int]], word: int
-) -> None:
+def test_status_word_matches_its_state_only(marks: list[tuple[str, int, int]], word: int) -> None:
     chart = states(*marks)
     assert word_of(chart, chart.states[-1]) == word
 
 
-def test_a_bit_of_its_own_is_left_out_where_it_would_tell_another_state() -> None:
+def test_extra_bit_is_omitted_if_it_would_show_another_state() -> None:
     chart = states(("first", 3, 3), ("wanted", 1, 1))
     assert with_bit(chart, 1, 1, on=True) == 1
     assert with_bit(chart, 1, 8, on=True) == 0x101
@@ -322,7 +320,7 @@ def relative() -> Profile:
     )
 
 
-def test_another_family_with_the_drivecom_chart_walks_through_it() -> None:
+def test_own_family_with_the_drivecom_chart_follows_it() -> None:
     Exchange(relative()).play("""
         > 02 06 2136 00C8
         > 02 06 2135 0006
@@ -342,7 +340,7 @@ def test_another_family_with_the_drivecom_chart_walks_through_it() -> None:
     """)
 
 
-def test_a_copy_of_a_family_without_its_words_goes_by_its_own_chart() -> None:
+def test_copy_of_a_family_without_its_words_uses_its_own_chart() -> None:
     data = words(kind="altivar21")
     Exchange(data).play("""
         > 02 06 2001 03E8

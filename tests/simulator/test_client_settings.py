@@ -57,7 +57,7 @@ def served(timing: LineTiming, **more: object) -> Simulation:
 
 
 @pytest.mark.parametrize(("baud", "form"), [(19200, "8E1"), (9600, "8N2"), (9600, "8E1")])
-def test_a_client_that_sets_nothing_is_heard(baud: int, form: str) -> None:
+def test_client_without_line_settings_is_answered(baud: int, form: str) -> None:
     with (
         served(LineTiming(baud, form)) as running,
         terminal(running.serve_pty()) as port,
@@ -65,7 +65,7 @@ def test_a_client_that_sets_nothing_is_heard(baud: int, form: str) -> None:
         assert heard(port)
 
 
-def test_a_client_that_sets_nothing_is_heard_by_a_drive_that_was_set_otherwise() -> None:
+def test_client_without_line_settings_is_answered_by_a_drive_with_others() -> None:
     with (
         served(LineTiming(19200, "8E1"), sets={"TBR": 28, "TFO": 5}) as running,
         terminal(running.serve_pty()) as port,
@@ -93,7 +93,7 @@ def test_baud_and_stop_bits_of_a_pseudo_terminal_matter(
         assert heard(port) is answers
 
 
-def test_with_any_settings_they_do_not() -> None:
+def test_any_settings_option_ignores_client_settings() -> None:
     with (
         Simulation([DriveSpec("atv71", 2)], profiles=PROFILES, any_settings=True) as running,
         terminal(running.serve_pty(), 300, 2) as port,
@@ -101,7 +101,7 @@ def test_with_any_settings_they_do_not() -> None:
         assert heard(port)
 
 
-def test_a_drive_that_was_set_to_another_baud_is_heard_there_after_its_next_power_up() -> None:
+def test_drive_answers_at_its_new_baud_after_power_up() -> None:
     """TBR = 28 (9600) is in force after power-up; the old baud is deaf then."""
     change, save = (seal(bytes.fromhex(f"0206{words}")) for words in ("1773001C", "1F410001"))
     with (
@@ -146,14 +146,14 @@ class OwnTransport:
         ("8N2", "E", 2, False),
     ],
 )
-def test_parity_matters_where_it_can_be_seen(
+def test_parity_matters_if_detectable(
     drive: str, parity: str, stop_bits: int, answers: bool
 ) -> None:
     transport = OwnTransport(drive, ClientSettings(19200, parity, stop_bits))
     assert transport.exchange(REQUEST) == (REPLY if answers else b"")
 
 
-def test_drives_at_different_bauds_are_heard_one_at_a_time() -> None:
+def test_drives_at_different_bauds_answer_at_their_own_only() -> None:
     with Simulation(
         [DriveSpec("atv71", 2), DriveSpec("atv71", 3, sets={"TBR": 28})], profiles=PROFILES
     ) as running:
@@ -169,7 +169,7 @@ def test_drives_at_different_bauds_are_heard_one_at_a_time() -> None:
 # What a damaged frame leaves in the counters
 
 
-def test_the_atv71_counts_damaged_frames_among_all_frames() -> None:
+def test_atv71_frame_count_includes_damaged_frames() -> None:
     """Manual, Modbus counters: correct and incorrect ones, no broadcasts, its own address only."""
     rig = Exchange("atv71")
     rig.play("""

@@ -49,7 +49,7 @@ def test_a_request_is_answered_as_soon_as_it_is_complete() -> None:
     assert talk.due is None
 
 
-def test_glued_requests_are_not_understood_and_the_next_one_is() -> None:
+def test_joined_requests_are_ignored_but_the_next_is_answered() -> None:
     talk = conversation()
     talk.feed(REQUEST + REQUEST, 1.0)
     assert everything(talk, 2.0) == []
@@ -57,7 +57,7 @@ def test_glued_requests_are_not_understood_and_the_next_one_is() -> None:
     assert talk.poll(2.0) == REPLY
 
 
-def test_garbage_ends_with_silence() -> None:
+def test_garbage_ends_at_the_next_gap() -> None:
     talk = conversation()
     talk.feed(b"\x99\x88", 1.0)
     assert talk.due == pytest.approx(1.0 + SILENCE_ENDS_FRAME)
@@ -65,7 +65,7 @@ def test_garbage_ends_with_silence() -> None:
     assert talk.poll(1.0 + 2 * SILENCE_ENDS_FRAME) == REPLY
 
 
-def test_a_wrong_byte_count_is_understood_after_a_silence() -> None:
+def test_request_with_a_wrong_byte_count_ends_at_the_gap() -> None:
     timing = LineTiming()
     drive = SimulatedDrive(PROFILES["atv21"], DriveSpec("atv21", 1), timing=timing)
     talk = RtuConversation(SimulatedLine([drive], timing), FaultPlan(FaultRates(), 1))
@@ -76,7 +76,7 @@ def test_a_wrong_byte_count_is_understood_after_a_silence() -> None:
 # In real time
 
 
-def test_a_reply_comes_after_the_turnaround_and_at_the_pace_of_the_line() -> None:
+def test_reply_follows_the_turnaround_at_the_line_speed() -> None:
     talk = conversation(REAL)
     talk.feed(REQUEST, 1.0)
     written = everything(talk, 2.0)
@@ -87,42 +87,42 @@ def test_a_reply_comes_after_the_turnaround_and_at_the_pace_of_the_line() -> Non
     assert last - first == pytest.approx((len(REPLY) - 1) * CHARACTER, abs=1e-6)
 
 
-def test_a_late_poll_gets_all_that_is_due() -> None:
+def test_late_poll_gets_all_due_bytes() -> None:
     talk = conversation(REAL)
     talk.feed(REQUEST, 1.0)
     talk.poll(1.008)
     assert talk.poll(2.0) == REPLY
 
 
-def test_a_pause_of_less_than_the_silence_belongs_to_the_frame() -> None:
+def test_pause_shorter_than_the_gap_is_part_of_the_frame() -> None:
     talk = conversation(REAL)
     talk.feed(REQUEST[:3], 1.0)
     talk.feed(REQUEST[3:], 1.0 + 3 * CHARACTER + 0.9 * REAL.silence)
     assert b"".join(out for _, out in everything(talk, 2.0)) == REPLY
 
 
-def test_a_pause_longer_than_the_silence_ends_the_frame() -> None:
+def test_pause_longer_than_the_gap_ends_the_frame() -> None:
     talk = conversation(REAL)
     talk.feed(REQUEST[:3], 1.0)
     talk.feed(REQUEST[3:], 1.0 + 3 * CHARACTER + 1.1 * REAL.silence)
     assert everything(talk, 2.0) == []
 
 
-def test_two_requests_without_a_silence_are_one_blob() -> None:
+def test_two_requests_without_a_gap_are_one_frame() -> None:
     talk = conversation(REAL)
     talk.feed(REQUEST, 1.0)
     talk.feed(REQUEST, 1.0 + len(REQUEST) * CHARACTER + 0.5 * REAL.silence)
     assert everything(talk, 2.0) == []
 
 
-def test_two_requests_with_a_silence_are_both_answered() -> None:
+def test_two_requests_with_a_gap_are_both_answered() -> None:
     talk = conversation(REAL)
     talk.feed(REQUEST, 1.0)
     talk.feed(REQUEST, 1.0 + len(REQUEST) * CHARACTER + 1.1 * REAL.silence)
     assert sum(len(out) for _, out in everything(talk, 2.0)) == 2 * len(REPLY)
 
 
-def test_a_medium_that_takes_its_own_time_is_not_paced_again() -> None:
+def test_medium_with_its_own_timing_is_not_delayed_again() -> None:
     talk = conversation(REAL, paced=True)
     talk.feed(REQUEST, 1.0)
     [(moment, reply)] = everything(talk, 2.0)
@@ -133,7 +133,7 @@ def test_a_medium_that_takes_its_own_time_is_not_paced_again() -> None:
 # Line faults
 
 
-def test_a_late_reply_comes_late_and_whole() -> None:
+def test_late_reply_is_late_and_complete() -> None:
     talk = conversation(rates=FaultRates(late=1.0, late_by=(0.4, 0.4)))
     talk.feed(REQUEST, 1.0)
     [(moment, reply)] = everything(talk, 2.0)
@@ -141,7 +141,7 @@ def test_a_late_reply_comes_late_and_whole() -> None:
     assert reply == REPLY
 
 
-def test_a_late_reply_does_not_hold_up_the_next_one() -> None:
+def test_late_reply_does_not_delay_the_next() -> None:
     talk = conversation(rates=FaultRates(late=1.0, late_by=(0.4, 0.4)))
     talk.feed(REQUEST, 1.0)
     talk.feed(REQUEST, 1.1)
@@ -170,13 +170,13 @@ def test_tcp_messages_are_answered_with_their_transaction() -> None:
 
 
 @pytest.mark.parametrize("unit", [3, 0])
-def test_a_unit_that_is_not_there_and_a_broadcast_get_no_answer(unit: int) -> None:
+def test_absent_unit_and_broadcast_get_no_reply(unit: int) -> None:
     talk = tcp()
     talk.feed(bytes.fromhex("123400000006") + bytes([unit]) + bytes.fromhex("0323290001"), 1.0)
     assert talk.poll(9.0) == b""
 
 
-def test_unit_255_is_the_only_drive() -> None:
+def test_unit_255_addresses_the_only_drive() -> None:
     talk = tcp()
     talk.feed(bytes.fromhex("123400000006FF0323290001"), 1.0)
     assert talk.poll(1.0).hex() == "123400000005ff0302001e"

@@ -26,7 +26,7 @@ def raws_of(simulated: SimulatedDrive) -> dict[str, int]:
 
 
 @pytest.mark.parametrize("family", COMMISSIONED)
-def test_it_starts_with_the_factory_settings_of_its_profile(family: str) -> None:
+def test_drive_starts_with_the_factory_settings_of_its_profile(family: str) -> None:
     simulated = drive(family)
     profile, raws = simulated.profile, raws_of(simulated)
     line = {setting.parameter for setting in profile.data.link.settings}
@@ -38,7 +38,7 @@ def test_it_starts_with_the_factory_settings_of_its_profile(family: str) -> None
     ("family", "code", "times"),
     [("atv31", "CLI", 1.5), ("atv312", "IdC", 0.7), ("atv71", "SDC2", 0.5)],
 )
-def test_current_related_values_start_with_their_share(
+def test_current_values_start_as_a_share_of_the_rated_current(
     family: str, code: str, times: float
 ) -> None:
     simulated = drive(family)
@@ -47,7 +47,7 @@ def test_current_related_values_start_with_their_share(
     assert simulated.raw(code) == int(times * current)
 
 
-def test_the_mains_standard_brings_its_own_speeds() -> None:
+def test_mains_standard_sets_its_speeds() -> None:
     simulated = drive("atv31")
     profile = simulated.profile
     assert [simulated.raw(c) for c in ("HSP", "tFr", "FrS", "Ftd")] == [500, 600, 500, 500]
@@ -59,7 +59,7 @@ def test_the_mains_standard_brings_its_own_speeds() -> None:
 
 
 @pytest.mark.parametrize(("raw", "held"), [(10000, 1.5), (1, 0.2)])
-def test_a_current_is_cut_to_its_share_of_the_rated_one(raw: int, held: float) -> None:
+def test_current_is_limited_to_its_share_of_the_rated_current(raw: int, held: float) -> None:
     """As other limits of this family are; the manual of the Altivar 31 gives 0.2 to 1.5 In."""
     simulated = drive("atv31")
     address = simulated.profile["ItH"].address

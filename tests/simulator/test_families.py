@@ -36,7 +36,7 @@ def value(simulated: SimulatedDrive, quantity: Quantity) -> float:
 
 
 @pytest.mark.parametrize("profile", FAMILIES)
-def test_a_plain_drive_stands_without_a_fault(profile: str) -> None:
+def test_default_drive_is_at_standstill_without_a_fault(profile: str) -> None:
     simulated = drive(profile)
     run(simulated, 2)
     assert simulated.fault is None
@@ -45,7 +45,7 @@ def test_a_plain_drive_stands_without_a_fault(profile: str) -> None:
 
 
 @pytest.mark.parametrize("profile", FAMILIES)
-def test_a_run_order_at_the_terminals_makes_it_run_and_its_end_stops_it(profile: str) -> None:
+def test_terminal_run_command_starts_and_stops_the_motor(profile: str) -> None:
     simulated = drive(profile, run_hz=30.0)
     run(simulated, 12)
     assert simulated.motor.frequency == pytest.approx(30, abs=0.1)
@@ -57,7 +57,7 @@ def test_a_run_order_at_the_terminals_makes_it_run_and_its_end_stops_it(profile:
 
 
 @pytest.mark.parametrize("profile", FAMILIES)
-def test_a_fault_is_seen_and_its_end_too(profile: str) -> None:
+def test_fault_is_visible_until_it_ends(profile: str) -> None:
     simulated = drive(profile)
     simulated.provoke(9)
     assert state(simulated) == "fault"
@@ -66,7 +66,7 @@ def test_a_fault_is_seen_and_its_end_too(profile: str) -> None:
 
 
 @pytest.mark.parametrize("profile", ALTIVAR)
-def test_the_values_of_a_running_motor_are_alive_and_plausible(profile: str) -> None:
+def test_values_of_a_running_motor_change_plausibly(profile: str) -> None:
     simulated = drive(profile, run_hz=40.0)
     run(simulated, 30)
     assert value(simulated, "output_frequency") == pytest.approx(40, abs=0.1)
@@ -87,7 +87,7 @@ def monitored(simulated: SimulatedDrive) -> list[Parameter]:
 
 
 @pytest.mark.parametrize("profile", ["atv71", "atv21"])
-def test_the_drive_tells_the_model_that_it_identifies_itself_as(profile: str) -> None:
+def test_model_word_matches_the_identification(profile: str) -> None:
     simulated = drive(profile)
     identification = simulated.profile.data.identification
     raw = simulated.raw(identification.model_parameter)
@@ -108,7 +108,7 @@ def test_every_word_of_every_family_can_be_read(profile: str) -> None:
 
 @pytest.mark.parametrize("profile", ["atv31", "atv312", "atv71"])
 @pytest.mark.parametrize(("reaction", "hertz"), [(1, 0.0), (6, 20.0), (7, 0.0)])
-def test_a_silent_line_stops_as_sll_says(profile: str, reaction: int, hertz: float) -> None:
+def test_communication_loss_stops_as_set_in_sll(profile: str, reaction: int, hertz: float) -> None:
     """Freewheel, ramp stop and fast stop, half a second after the timeout of 1.0 s."""
     simulated = drive(profile, sets={"SLL": reaction, "TTO": 10})
     frequency = simulated.profile.quantity("command_frequency")

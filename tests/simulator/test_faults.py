@@ -15,16 +15,16 @@ def hit(kind: str, seed: int = 1) -> list[tuple[float, bytes]]:
     return FaultPlan(FaultRates(**{kind: 1.0}), seed).carry(FRAME)  # type: ignore[arg-type]
 
 
-def test_without_rates_a_reply_passes() -> None:
+def test_reply_passes_without_fault_rates() -> None:
     plan = FaultPlan(FaultRates(), 1)
     assert [plan.carry(FRAME) for _ in range(50)] == [[(0.0, FRAME)]] * 50
 
 
-def test_lost() -> None:
+def test_lost_reply_is_not_sent() -> None:
     assert hit("lost") == []
 
 
-def test_late_within_its_range() -> None:
+def test_late_reply_is_delayed_within_its_range() -> None:
     plan = FaultPlan(FaultRates(late=1.0, late_by=(0.2, 0.3)), 1)
     for _ in range(20):
         [(delay, data)] = plan.carry(FRAME)
@@ -32,19 +32,19 @@ def test_late_within_its_range() -> None:
         assert data == FRAME
 
 
-def test_duplicated() -> None:
+def test_duplicated_reply_is_sent_twice() -> None:
     assert [data for _, data in hit("duplicated")] == [FRAME, FRAME]
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_truncated(seed: int) -> None:
+def test_truncated_reply_is_shortened(seed: int) -> None:
     [(_, data)] = hit("truncated", seed)
     assert 0 < len(data) < len(FRAME)
     assert FRAME.startswith(data)
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_corrupted_by_one_bit(seed: int) -> None:
+def test_corrupted_reply_differs_in_one_bit(seed: int) -> None:
     [(_, data)] = hit("corrupted", seed)
     assert sum((a ^ b).bit_count() for a, b in zip(data, FRAME, strict=True)) == 1
     assert not is_sealed(data)
@@ -58,7 +58,7 @@ def test_noise_before_the_reply(seed: int) -> None:
 
 
 @pytest.mark.parametrize("seed", range(20))
-def test_another_drives_reply_is_whole_but_not_ours(seed: int) -> None:
+def test_foreign_reply_is_valid_with_another_address(seed: int) -> None:
     [(_, data)] = hit("foreign", seed)
     assert is_sealed(data)
     assert data[0] != FRAME[0]
@@ -70,7 +70,7 @@ MIXED = FaultRates(
 )
 
 
-def test_a_seed_repeats_all_faults_and_another_does_not() -> None:
+def test_same_seed_repeats_all_faults() -> None:
     runs = []
     for seed in (7, 7, 8):
         plan = FaultPlan(MIXED, seed)
@@ -79,7 +79,7 @@ def test_a_seed_repeats_all_faults_and_another_does_not() -> None:
     assert runs[0] != runs[2]
 
 
-def test_faults_hit_as_often_as_their_rates_say() -> None:
+def test_faults_occur_at_their_rates() -> None:
     plan = FaultPlan(MIXED, 3)
     for _ in range(3000):
         plan.carry(FRAME)

@@ -10,13 +10,13 @@ from .manual import FRAMES, Frame
 
 
 @pytest.mark.parametrize("frame", FRAMES, ids=lambda frame: f"{frame.family}-{frame.number}")
-def test_every_frame_of_the_manuals_has_the_checksum_that_we_compute(frame: Frame) -> None:
+def test_frames_of_the_manuals_have_the_computed_checksum(frame: Frame) -> None:
     assert is_sealed(frame.data)
     assert seal(frame.data[:-2]) == frame.data
 
 
 @pytest.mark.parametrize("frame", [f for f in FRAMES if f.printed], ids=lambda f: f"{f.number}")
-def test_a_misprinted_checksum_is_seen(frame: Frame) -> None:
+def test_misprinted_checksum_is_detected(frame: Frame) -> None:
     assert frame.printed is not None
     assert not is_sealed(frame.printed)
     assert frame.printed[:-2] == frame.data[:-2]
@@ -34,12 +34,12 @@ def test_checksum_of_nothing_is_its_start_value() -> None:
 @pytest.mark.parametrize(
     "frame", [f for f in FRAMES if f.direction == "request"], ids=lambda f: f"{f.number}"
 )
-def test_requests_announce_their_length(frame: Frame) -> None:
+def test_request_length_is_known_from_its_header(frame: Frame) -> None:
     wrong_byte_count = frame.meaning.startswith("Announces three bytes")
     expected = len(frame.data) - (1 if wrong_byte_count else 0)
     assert request_length(frame.data) == expected
 
 
 @pytest.mark.parametrize("head", ["", "01", "0110FA010001", "0199", "01170C1E000423290002"])
-def test_length_is_unknown_before_the_bytes_that_tell_it(head: str) -> None:
+def test_length_is_unknown_before_its_bytes(head: str) -> None:
     assert request_length(bytes.fromhex(head)) is None

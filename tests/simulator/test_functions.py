@@ -23,7 +23,7 @@ from .bench import Bench
         ("atv71", struct.pack(">BHH", 3, 3102, 1) + b"\0", "8303"),
     ],
 )
-def test_requests_past_the_limits_are_refused(profile: str, pdu: bytes, answer: str) -> None:
+def test_requests_beyond_the_limits_are_refused(profile: str, pdu: bytes, answer: str) -> None:
     assert Bench(profile).ask(pdu.hex()) == answer
 
 
@@ -35,17 +35,17 @@ def test_requests_past_the_limits_are_refused(profile: str, pdu: bytes, answer: 
         struct.pack(">BHHHHBH", 23, 104, 21, 104, 1, 2, 1),
     ],
 )
-def test_past_its_limits_a_leroy_somer_drive_is_silent(pdu: bytes) -> None:
+def test_leroy_somer_is_silent_beyond_its_limits(pdu: bytes) -> None:
     assert Bench("powerdrive").ask(pdu.hex()) is None
 
 
-def test_function_23_writes_first_and_reads_then() -> None:
+def test_function_23_writes_before_it_reads() -> None:
     bench = Bench("atv71")
     pdu = struct.pack(">BHHHHBHH", 23, 9001, 2, 9001, 2, 4, 20, 31)
     assert bench.ask(pdu.hex()) == "17040014001F"
 
 
-def test_function_23_on_leroy_somer() -> None:
+def test_function_23_works_on_leroy_somer() -> None:
     bench = Bench("powerdrive")
     pdu = struct.pack(">BHHHHBH", 23, 104, 2, 105, 1, 2, 1500)
     assert bench.ask(pdu.hex()) == "1704000005DC"
@@ -54,11 +54,11 @@ def test_function_23_on_leroy_somer() -> None:
 # Diagnostics
 
 
-def test_echo_of_any_length() -> None:
+def test_diagnostic_echo_has_any_length() -> None:
     assert Bench("atv71").ask("08000001020304") == "08000001020304"
 
 
-def test_frames_to_the_drive_are_counted_and_can_be_read_two_ways() -> None:
+def test_frame_count_is_readable_in_two_ways() -> None:
     bench = Bench("atv71")
     for _ in range(4):
         bench.word("ACC")
@@ -73,7 +73,7 @@ def test_broadcasts_are_not_counted() -> None:
     assert bench.word("ACC") == 5
 
 
-def test_the_frame_counter_starts_again_after_65535_and_the_error_counter_stays() -> None:
+def test_frame_counter_wraps_but_error_counter_saturates() -> None:
     bench = Bench("atv71")
     counters = bench.drive.server.counters
     counters.frames = counters.checksum_errors = 0xFFFF
@@ -109,7 +109,7 @@ def test_unknown_diagnostics_are_refused(pdu: str, answer: str) -> None:
         ("2B0E01", "AB0E01"),
     ],
 )
-def test_a_refused_identification_carries_the_mei_byte_on_altivar_71(pdu: str, answer: str) -> None:
+def test_altivar_71_refused_identification_has_the_mei_byte(pdu: str, answer: str) -> None:
     assert Bench("atv71").ask(pdu) == answer
 
 
@@ -117,18 +117,18 @@ def test_a_refused_identification_carries_the_mei_byte_on_altivar_71(pdu: str, a
     ("pdu", "answer"),
     [("2B0D0100", "AB01"), ("2B0E0400", "AB03"), ("2B0E0101", "AB03")],
 )
-def test_a_refused_identification_is_a_plain_exception_on_altivar_21(pdu: str, answer: str) -> None:
+def test_altivar_21_refused_identification_is_a_plain_exception(pdu: str, answer: str) -> None:
     assert Bench("atv21").ask(pdu) == answer
 
 
 @pytest.mark.parametrize("read_id", [1, 2, 3])
-def test_altivar_21_takes_three_read_device_ids(read_id: int) -> None:
+def test_altivar_21_accepts_three_read_device_ids(read_id: int) -> None:
     reply = Bench("atv21").ask(f"2B0E{read_id:02X}00")
     assert reply is not None
     assert reply.startswith(f"2B0E{read_id:02X}01000003000D54656C")
 
 
-def test_the_name_given_to_the_drive_is_reported_up_to_16_characters() -> None:
+def test_drive_name_has_at_most_16_characters() -> None:
     reply = Bench("atv71", name="PUMP NUMBER 1 BEHIND THE HALL").ask("2B0E0100")
     assert reply is not None
     assert bytes.fromhex(reply).endswith(b"\x06\x10PUMP NUMBER 1 BE")

@@ -14,7 +14,7 @@ def simulation(*profiles: str) -> Simulation:
     return Simulation(drives, profiles=PROFILES)
 
 
-def test_a_line_sets_inputs_of_the_drive_that_it_names() -> None:
+def test_line_sets_inputs_of_the_named_drive() -> None:
     made = simulation("atv312", "atv21")
     assert set_inputs(made, "2: LI1=1, AI1=5V") == "2: LI1 = 1, AI1 = 50 %"
     assert set_inputs(made, " 3:f=1 ") == "3: F = 1"
@@ -22,13 +22,13 @@ def test_a_line_sets_inputs_of_the_drive_that_it_names() -> None:
     assert made.drive(3).terminals.closed("F")
 
 
-def test_without_inputs_they_are_reported() -> None:
+def test_line_without_values_reports_the_inputs() -> None:
     made = simulation("atv21")
     set_inputs(made, "2: F=1, VIA=4V")
     assert set_inputs(made, "2:") == "2: closed of F, R, RES: F; VIA 40 %, VIB 0 %"
 
 
-def test_the_address_may_be_left_out_where_there_is_one_drive() -> None:
+def test_address_may_be_omitted_for_a_single_drive() -> None:
     assert set_inputs(simulation("atv21"), "F=1") == "2: F = 1"
     with pytest.raises(SimulatorError, match=r"Say which drive.*2, 3"):
         set_inputs(simulation("atv21", "atv312"), "F=1")
@@ -45,7 +45,7 @@ def test_the_address_may_be_left_out_where_there_is_one_drive() -> None:
         ("2: LI1=1, AI1=50V", "more than its full scale"),
     ],
 )
-def test_a_line_that_is_wrong_sets_nothing(line: str, why: str) -> None:
+def test_invalid_line_sets_nothing(line: str, why: str) -> None:
     made = simulation("atv312")
     with pytest.raises(SimulatorError, match=why):
         set_inputs(made, line)

@@ -43,13 +43,13 @@ def test_each_drive_answers_at_its_own_address_only() -> None:
     assert requested(on, 4, read(9)) is None
 
 
-def test_a_broadcast_is_obeyed_by_all_and_answered_by_none() -> None:
+def test_broadcast_is_executed_by_all_and_not_answered() -> None:
     on = line(DriveSpec("atv71", 2), DriveSpec("atv312", 3))
     assert requested(on, 0, write(9001, 55)) is None
     assert [on.drive(a).raw("ACC") for a in (2, 3)] == [55, 55]
 
 
-def test_only_the_functions_that_may_be_broadcast_are_obeyed() -> None:
+def test_only_broadcast_functions_are_executed() -> None:
     on = line(DriveSpec("powerdrive", 2), DriveSpec("atv71", 3))
     many = struct.pack(">BHHBH", 16, 104, 1, 2, 7)
     assert requested(on, 0, many) is None
@@ -75,23 +75,23 @@ def test_only_the_functions_that_may_be_broadcast_are_obeyed() -> None:
         (5, 0, False),
     ],
 )
-def test_group_addresses(own: int, called: int, intended: bool) -> None:
+def test_group_addresses_select_their_drives(own: int, called: int, intended: bool) -> None:
     assert in_group(own, called) is intended
 
 
-def test_a_group_is_obeyed_in_silence_by_leroy_somer_drives() -> None:
+def test_leroy_somer_drives_execute_group_requests_silently() -> None:
     on = line(DriveSpec("powerdrive", 12), DriveSpec("powerdrive", 15), DriveSpec("atv71", 21))
     assert requested(on, 10, write(104, 9)) is None
     assert [on.drive(a).raw("1.05") for a in (12, 15)] == [9, 9]
     assert requested(on, 10, read(104)) is None
 
 
-def test_an_altivar_answers_at_an_address_with_a_zero() -> None:
+def test_altivar_answers_at_an_address_ending_in_zero() -> None:
     on = line(DriveSpec("powerdrive", 12), DriveSpec("atv71", 10))
     assert requested(on, 10, read(9001)) == bytes.fromhex("0A0302001E")
 
 
-def test_a_leroy_somer_drive_never_answers_at_a_group_address() -> None:
+def test_leroy_somer_drive_never_answers_at_a_group_address() -> None:
     assert requested(line(DriveSpec("powerdrive", 10)), 10, read(104)) is None
 
 
@@ -115,7 +115,7 @@ def test_a_server_whose_address_is_0_is_off() -> None:
     assert requested(on, 54, read(20)) is None
 
 
-def test_a_cards_requests_do_not_feed_the_drives_watch_nor_its_counters() -> None:
+def test_requests_to_a_card_affect_neither_timeout_nor_counters() -> None:
     on = line(DriveSpec("atv71", 2, sets={"AMOA": 54, "TTO": 10}))
     drive = on.drive(2)
     requested(on, 2, write(8501, 0))
@@ -129,7 +129,7 @@ def test_a_cards_requests_do_not_feed_the_drives_watch_nor_its_counters() -> Non
 # What a drive does not understand
 
 
-def test_a_frame_with_a_wrong_checksum_is_counted_by_the_drive_it_is_for() -> None:
+def test_bad_checksum_is_counted_by_the_addressed_drive() -> None:
     on = line(*TWO)
     frame = bytearray(seal(b"\x02" + read(9001)))
     frame[-1] ^= 1
@@ -137,7 +137,7 @@ def test_a_frame_with_a_wrong_checksum_is_counted_by_the_drive_it_is_for() -> No
     assert requested(on, 2, bytes.fromhex("08000C0000")) == bytes.fromhex("0208000C0001")
 
 
-def test_two_frames_in_one_are_not_understood() -> None:
+def test_two_joined_frames_are_ignored() -> None:
     frame = seal(b"\x02" + read(9001))
     assert line(*TWO).receive(frame + frame) is None
 
@@ -155,7 +155,7 @@ def test_a_drive_without_supply_is_silent() -> None:
     assert requested(on, 2, read(9001)) is not None
 
 
-def test_a_drive_takes_the_lines_settings_and_is_deaf_once_it_has_others() -> None:
+def test_drive_with_other_settings_than_the_line_is_silent() -> None:
     on = line(DriveSpec("atv71", 2), timing=LineTiming(9600, "8N2"))
     drive = on.drive(2)
     assert (drive.raw("TBR"), drive.raw("TFO")) == (28, 5)
@@ -166,16 +166,16 @@ def test_a_drive_takes_the_lines_settings_and_is_deaf_once_it_has_others() -> No
     assert requested(on, 2, read(9001)) is None
 
 
-def test_a_set_baud_of_another_line_makes_a_drive_deaf() -> None:
+def test_drive_with_another_baud_is_silent() -> None:
     assert requested(line(DriveSpec("atv71", 2, sets={"TBR": 28})), 2, read(9001)) is None
 
 
-def test_an_address_nobody_has_is_reported() -> None:
+def test_unknown_drive_address_is_reported() -> None:
     with pytest.raises(SimulatorError, match="Addresses: 2, 3"):
         line(*TWO).drive(9)
 
 
-def test_time_passes_with_the_clock_only_while_the_line_runs() -> None:
+def test_time_passes_only_while_the_line_runs() -> None:
     now = [100.0]
     spec = DriveSpec("atv71", 2, run_hz=30.0)
     on = SimulatedLine([SimulatedDrive(PROFILES["atv71"], spec)], LineTiming(), lambda: now[0])
@@ -191,7 +191,7 @@ def test_time_passes_with_the_clock_only_while_the_line_runs() -> None:
     assert on.drive(2).motor.frequency == pytest.approx(10, abs=0.1)
 
 
-def test_the_turnaround_is_that_of_the_profile_or_of_the_drives_delay() -> None:
+def test_turnaround_comes_from_the_profile_or_the_drive_delay() -> None:
     on = line(DriveSpec("atv71", 2), DriveSpec("powerdrive", 3))
     assert on.drive(2).station.turnaround == pytest.approx(0.005)
     assert on.drive(3).station.turnaround == pytest.approx(0.010)
@@ -199,7 +199,7 @@ def test_the_turnaround_is_that_of_the_profile_or_of_the_drives_delay() -> None:
     assert on.drive(3).station.turnaround == pytest.approx(0.040)
 
 
-def test_another_protocol_makes_an_altivar_21_deaf_after_the_next_power_up() -> None:
+def test_altivar_21_with_another_protocol_is_silent_after_power_up() -> None:
     on = line(*TWO)
     assert requested(on, 3, write(0x829, 2)) is not None
     assert requested(on, 3, read(9)) is not None

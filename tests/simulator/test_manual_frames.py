@@ -32,13 +32,13 @@ def expected(example: Example) -> bytes:
     return FRAMES[example.response].data
 
 
-def test_every_frame_is_used() -> None:
+def test_every_manual_frame_is_used() -> None:
     used = {e.request for e in EXAMPLES} | {e.response for e in EXAMPLES} | NEVER_ANSWERED
     assert {frame.number for frame in FRAMES} <= used
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=ids)
-def test_the_drive_answers_as_its_manual_prints(example: Example) -> None:
+def test_drive_answers_as_printed_in_its_manual(example: Example) -> None:
     reply = simulated(example).line.receive(FRAMES[example.request].data)
     assert reply is not None
     assert reply.data.hex() == expected(example).hex()
@@ -54,7 +54,7 @@ def test_a_misprinted_checksum_is_not_answered(example: Example) -> None:
 
 
 @pytest.mark.parametrize("example", EXAMPLES, ids=ids)
-def test_the_drive_answers_so_over_a_terminal(example: Example) -> None:
+def test_drive_answers_as_printed_over_a_pseudo_terminal(example: Example) -> None:
     with simulated(example) as simulation:
         port = os.open(simulation.serve_pty(), os.O_RDWR | os.O_NOCTTY)
         try:

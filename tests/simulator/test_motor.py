@@ -30,7 +30,9 @@ def run(state: MotorState, order: MotorDemand, seconds: float, load: float = 0.7
         ("", 4.0, 400),
     ],
 )
-def test_a_rating_is_read_from_the_reference(reference: str, power: float, voltage: float) -> None:
+def test_rating_is_read_from_the_model_reference(
+    reference: str, power: float, voltage: float
+) -> None:
     rating = rating_of(reference)
     assert rating.power == pytest.approx(power)
     assert rating.voltage == voltage
@@ -41,7 +43,7 @@ def test_a_1_5_kw_motor_at_230_v_takes_about_6_a_from_a_drive_of_about_8_a() -> 
     assert 7 < RATING.drive_current < 9
 
 
-def test_the_ramp_takes_its_time_up_and_down() -> None:
+def test_ramp_takes_its_time_up_and_down() -> None:
     state = run(MotorState(), GO, 2.5)
     assert state.frequency == pytest.approx(25)
     state = run(state, GO, 2.5)
@@ -50,13 +52,13 @@ def test_the_ramp_takes_its_time_up_and_down() -> None:
     assert state.frequency == pytest.approx(25)
 
 
-def test_reversing_goes_through_zero() -> None:
+def test_reversing_passes_zero() -> None:
     passed = approach(1.0, MotorDemand(True, -50.0, acceleration=10.0, deceleration=20.0), 0.1)
     assert passed == 0.0
     assert approach(0.0, MotorDemand(True, -50.0, acceleration=10.0), 0.1) == pytest.approx(-1.0)
 
 
-def test_at_speed_the_values_fit_the_rating() -> None:
+def test_values_at_rated_speed_match_the_rating() -> None:
     state = run(MotorState(), GO, 20)
     assert 0.6 * RATING.current < state.current < RATING.current
     assert state.voltage == pytest.approx(230)
@@ -67,13 +69,13 @@ def test_at_speed_the_values_fit_the_rating() -> None:
     assert 1400 < state.rotor * 30 < 1500
 
 
-def test_more_load_takes_more_current_and_slows_the_rotor() -> None:
+def test_more_load_increases_current_and_slip() -> None:
     light, heavy = run(MotorState(), GO, 20, load=0.3), run(MotorState(), GO, 20, load=1.0)
     assert light.current < heavy.current
     assert light.rotor > heavy.rotor
 
 
-def test_accelerating_takes_more_torque_and_braking_gives_some_back() -> None:
+def test_accelerating_needs_torque_and_braking_regenerates() -> None:
     accelerating = run(MotorState(), GO, 3)
     at_speed = run(MotorState(), GO, 20)
     fast = replace(GO, target=0.0, deceleration=60.0)
@@ -84,14 +86,14 @@ def test_accelerating_takes_more_torque_and_braking_gives_some_back() -> None:
     assert braking.dc_bus > at_speed.dc_bus
 
 
-def test_a_freewheeling_motor_coasts() -> None:
+def test_motor_without_output_coasts() -> None:
     state = run(run(MotorState(), GO, 10), MotorDemand(), 1)
     assert (state.frequency, state.current, state.voltage) == (0, 0, 0)
     assert 20 < state.rotor < 45
     assert run(state, MotorDemand(), 60).rotor == 0
 
 
-def test_injection_stops_sooner_than_coasting_and_takes_current() -> None:
+def test_dc_injection_stops_faster_than_coasting_and_draws_current() -> None:
     turning = run(MotorState(), GO, 10)
     braked = run(turning, MotorDemand(injection=True), 1)
     assert 0 < braked.rotor < run(turning, MotorDemand(), 1).rotor

@@ -47,13 +47,13 @@ def exchange(port: int) -> bytes:
     return read(port, len(REPLY))
 
 
-def test_a_terminal_serves_the_line() -> None:
+def test_pseudo_terminal_serves_the_line() -> None:
     with simulation() as running, terminal(running.serve_pty()) as port:
         assert exchange(port) == REPLY
         assert exchange(port) == REPLY
 
 
-def test_a_terminal_can_be_had_under_a_name(tmp_path: Path) -> None:
+def test_pseudo_terminal_has_a_link(tmp_path: Path) -> None:
     link = tmp_path / "line"
     with simulation() as running:
         assert running.serve_pty(str(link)) == str(link)
@@ -62,7 +62,7 @@ def test_a_terminal_can_be_had_under_a_name(tmp_path: Path) -> None:
     assert not link.is_symlink()
 
 
-def test_a_name_that_is_a_file_is_left_alone(tmp_path: Path) -> None:
+def test_existing_file_is_not_replaced_by_a_link(tmp_path: Path) -> None:
     taken = tmp_path / "file"
     taken.write_text("mine")
     with simulation() as running, pytest.raises(SimulatorError, match="is not a link"):
@@ -70,7 +70,7 @@ def test_a_name_that_is_a_file_is_left_alone(tmp_path: Path) -> None:
     assert taken.read_text() == "mine"
 
 
-def test_a_terminal_is_gone_without_its_plug_and_back_with_it(tmp_path: Path) -> None:
+def test_unplugged_pseudo_terminal_disappears_until_plugged(tmp_path: Path) -> None:
     link = str(tmp_path / "line")
     with simulation() as running:
         running.serve_pty(link)
@@ -104,7 +104,7 @@ def test_modbus_tcp_serves_several_clients() -> None:
                 assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
 
 
-def test_the_lines_bytes_over_tcp() -> None:
+def test_rtu_frames_are_served_over_tcp() -> None:
     with (
         simulation() as running,
         socket.create_connection(running.serve_rtu_tcp(), timeout=5) as client,
@@ -113,7 +113,7 @@ def test_the_lines_bytes_over_tcp() -> None:
         assert receive(client, len(REPLY)) == REPLY
 
 
-def test_tcp_connections_break_with_the_plug_and_the_port_comes_back() -> None:
+def test_unplugging_breaks_tcp_connections_until_plugged() -> None:
     with simulation() as running:
         place = running.serve_tcp()
         with socket.create_connection(place, timeout=5) as client:
@@ -129,14 +129,14 @@ def test_tcp_connections_break_with_the_plug_and_the_port_comes_back() -> None:
             assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
 
 
-def test_a_port_that_is_taken_is_reported() -> None:
+def test_port_in_use_is_reported() -> None:
     with simulation() as running:
         place = running.serve_tcp()
         with pytest.raises(SimulatorError, match="Nothing can be served"):
             running.serve_tcp(*place)
 
 
-def test_a_client_that_sends_nonsense_is_dropped_and_others_are_served() -> None:
+def test_client_that_sends_garbage_is_dropped_and_others_are_served() -> None:
     with simulation() as running:
         place = running.serve_tcp()
         with socket.create_connection(place, timeout=5) as client:
@@ -169,7 +169,7 @@ class Port:
         self.closed.set()
 
 
-def test_an_opened_port_is_served_and_closed_at_the_end() -> None:
+def test_open_port_is_served_and_closed_at_the_end() -> None:
     port = Port()
     with simulation() as running:
         running.serve_stream(port)
@@ -179,7 +179,7 @@ def test_an_opened_port_is_served_and_closed_at_the_end() -> None:
     assert port.closed.is_set()
 
 
-def test_several_ways_reach_the_same_drives() -> None:
+def test_several_connections_reach_the_same_drives() -> None:
     with simulation() as running:
         place = running.serve_tcp()
         with (
@@ -192,7 +192,7 @@ def test_several_ways_reach_the_same_drives() -> None:
             assert read(port, len(REPLY)) == seal(bytes.fromhex("020302001F"))
 
 
-def test_the_drives_time_passes_while_nobody_asks() -> None:
+def test_drive_time_passes_without_requests() -> None:
     with simulation() as running:
         end = time.monotonic() + 10
         while running.drive(3).motor.frequency < 2 and time.monotonic() < end:

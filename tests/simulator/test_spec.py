@@ -52,7 +52,7 @@ def test_invalid_sets_are_reported(text: str, message: str) -> None:
         (38400, "8O1", 11, 0.00175),
     ],
 )
-def test_line_timing(baud: int, form: str, bits: int, silence: float) -> None:
+def test_line_timing_is_parsed(baud: int, form: str, bits: int, silence: float) -> None:
     timing = LineTiming(baud, form)
     assert timing.bits_per_character == bits
     assert timing.character == pytest.approx(bits / baud)
@@ -60,12 +60,12 @@ def test_line_timing(baud: int, form: str, bits: int, silence: float) -> None:
 
 
 @pytest.mark.parametrize("form", ["", "8X1", "7E1", "8E3", "8e1"])
-def test_a_format_is_checked(form: str) -> None:
+def test_invalid_format_is_refused(form: str) -> None:
     with pytest.raises(SimulatorError, match="character format"):
         LineTiming(19200, form)
 
 
-def test_a_baud_is_checked() -> None:
+def test_invalid_baud_is_refused() -> None:
     with pytest.raises(SimulatorError, match="baud"):
         LineTiming(0)
 

@@ -38,7 +38,7 @@ def test_a_closed_run_input_starts_the_motor_after_a_reset(family: str) -> None:
     """)
 
 
-def test_with_tct_at_transition_the_input_has_to_open_first() -> None:
+def test_tct_at_transition_needs_the_input_to_open_first() -> None:
     Exchange("atv312", {**AT_THE_TERMINALS, "RSF": 132, "TCT": 1}).play("""
         @ AI1=6V
         @ LI1=1
@@ -57,7 +57,7 @@ def test_with_tct_at_transition_the_input_has_to_open_first() -> None:
     """)
 
 
-def test_inputs_outlive_the_supply() -> None:
+def test_inputs_survive_a_power_cycle() -> None:
     rig = Exchange("atv312", AT_THE_TERMINALS)
     rig.play("""
         @ AI1=6V
@@ -71,7 +71,7 @@ def test_inputs_outlive_the_supply() -> None:
     """)
 
 
-def test_li2_runs_the_other_way_and_the_inputs_are_shown() -> None:
+def test_li2_runs_in_reverse_and_inputs_are_shown() -> None:
     rig = Exchange("atv312", AT_THE_TERMINALS)
     rig.play("""
         @ AI1=6V
@@ -87,7 +87,7 @@ def test_li2_runs_the_other_way_and_the_inputs_are_shown() -> None:
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv312"])
-def test_cmi_bit_3_is_an_external_fault_until_it_is_taken_back(family: str) -> None:
+def test_cmi_bit_3_is_an_external_fault_until_cleared(family: str) -> None:
     rig = Exchange(family, {"EPL": 1})
     rig.play("""
         > 02 06 2138 0008
@@ -106,7 +106,7 @@ def test_cmi_bit_3_is_an_external_fault_until_it_is_taken_back(family: str) -> N
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv312"])
-def test_cmi_bit_13_keeps_a_standing_motor_at_rest_and_lets_a_turning_one_go_on(
+def test_cmi_bit_13_blocks_a_start_but_not_a_running_motor(
     family: str,
 ) -> None:
     rig = Exchange(family)
@@ -146,7 +146,7 @@ def test_an_input_may_be_the_external_fault() -> None:
 UNWATCHED = {"F803": 0, "CMOD": 0}
 
 
-def test_a_reset_of_an_altivar_21_puts_the_words_in_ram_back() -> None:
+def test_altivar_21_reset_clears_the_volatile_words() -> None:
     """Manual 8.2: the priority bits go too, so a closed F commands until 16#C000 arrives."""
     Exchange("atv21", UNWATCHED).play("""
         @ VIA=4V
@@ -183,7 +183,7 @@ def test_a_reset_of_an_altivar_21_puts_the_words_in_ram_back() -> None:
     """)
 
 
-def test_a_reference_above_fh_is_answered_by_exception_3() -> None:
+def test_reference_above_fh_is_exception_3() -> None:
     Exchange("atv21", {**UNWATCHED, "FH": 6000}).play("""
         > 02 06 FA01 1770
         < 02 06 FA01 1770
@@ -229,7 +229,7 @@ def test_input_r_with_function_48_forces_local_control() -> None:
     """)
 
 
-def test_res_resets_a_fault_and_the_inputs_show_in_fd06() -> None:
+def test_res_resets_a_fault_and_inputs_are_in_fd06() -> None:
     Exchange("atv21", UNWATCHED).play("""
         ! OC1
         > 02 03 FC90 0001
@@ -275,7 +275,7 @@ def test_a_closed_run_input_starts_a_leroy_somer_drive_after_a_reset() -> None:
         ("AI2", "33%", "AI2 = 33 %"),
     ],
 )
-def test_inputs_as_a_person_types_them(name: str, text: str, reported: str) -> None:
+def test_typed_inputs_are_set(name: str, text: str, reported: str) -> None:
     assert Terminals(COMPACT).set(name, text) == reported
 
 
@@ -290,12 +290,12 @@ def test_inputs_as_a_person_types_them(name: str, text: str, reported: str) -> N
         ("AI1", "21mA", "more than its full scale"),
     ],
 )
-def test_inputs_that_are_refused(name: str, text: str, why: str) -> None:
+def test_invalid_inputs_are_refused(name: str, text: str, why: str) -> None:
     with pytest.raises(SimulatorError, match=why):
         Terminals(COMPACT).set(name, text)
 
 
-def test_all_inputs_in_a_line() -> None:
+def test_inputs_are_reported_in_one_line() -> None:
     terminals = Terminals(BY_KIND["altivar21"])
     terminals.set("F", "1")
     assert terminals.reported() == "closed of F, R, RES: F; VIA 0 %, VIB 0 %"

@@ -62,7 +62,7 @@ class Client:
         return f"ex {reply.exception_code}" if reply.isError() else reply.registers[0]
 
 
-def test_replies_one_behind_carry_the_value_of_the_read_before() -> None:
+def test_replies_one_behind_have_the_value_of_the_previous_read() -> None:
     with sick({"behind": 1}, "rtu-tcp") as place, client(place, FramerType.RTU) as item:
         assert item.read(ETA) is None
         assert [item.read(RFR), item.read(ETA), item.read(ETA)] == [STATUS, FREQUENCY, STATUS]
@@ -90,7 +90,7 @@ def test_a_gateway_replies_with_its_exception(code: int) -> None:
         assert item.read(ETA) == f"ex {code}"
 
 
-def test_the_bytes_of_words_are_swapped() -> None:
+def test_bytes_of_words_are_swapped() -> None:
     with sick({"swapped": 1}) as place, client(place) as item:
         assert item.read(ETA) == 0x3706
 
@@ -167,12 +167,12 @@ def test_two_drives_at_one_address_on_the_wire() -> None:
         {"idle-close": float("nan")},
     ],
 )
-def test_a_trouble_out_of_its_range_is_refused(troubles: Mapping[str, float]) -> None:
+def test_trouble_out_of_range_is_refused(troubles: Mapping[str, float]) -> None:
     with pytest.raises(SimulatorError):
         troubles_of(troubles)
 
 
-def test_shares_are_those_of_the_table_and_the_page_has_all() -> None:
+def test_shares_match_the_table_and_the_page_lists_all() -> None:
     assert set(FaultRates().by_kind()) == {k for k, t in TROUBLES.items() if t.unit == SHARE}
     page = PAGE.read_text(encoding="utf-8").partition("\n## simulate\n")[2].partition("\n## ")[0]
     rows = re.findall(r"^\| `([\w-]+)=[\d.]+` \| ([^|]+) \|$", page, re.MULTILINE)

@@ -18,7 +18,7 @@ def running(reaction: int, profile: str = "atv71") -> Bench:
     return bench
 
 
-def test_reads_keep_the_watch_content() -> None:
+def test_reads_restart_the_timeout() -> None:
     bench = running(1)
     for _ in range(6):
         bench.run(0.8)
@@ -26,7 +26,7 @@ def test_reads_keep_the_watch_content() -> None:
     assert bench.drive.fault is None
 
 
-def test_a_silent_line_trips_after_the_time_out() -> None:
+def test_communication_loss_trips_after_the_timeout() -> None:
     bench = running(1)
     bench.run(0.96)
     assert bench.drive.fault is None
@@ -36,7 +36,7 @@ def test_a_silent_line_trips_after_the_time_out() -> None:
     assert bench.drive.motor.frequency == 0
 
 
-def test_the_watch_needs_an_order_first() -> None:
+def test_timeout_starts_with_the_first_command() -> None:
     bench = Bench("atv71", {"TTO": 10, "SLL": 1})
     bench.word("ETA")
     bench.run(3)
@@ -56,7 +56,7 @@ def test_command_of_another_master_applies_after_first_request() -> None:
 
 
 @pytest.mark.parametrize(("reaction", "seconds"), [(5, 1.3), (6, 0.35)])
-def test_a_ramp_and_a_fast_stop_come_before_the_fault(reaction: int, seconds: float) -> None:
+def test_ramp_and_fast_stop_precede_the_fault(reaction: int, seconds: float) -> None:
     bench = running(reaction)
     bench.run(1.04)
     assert bench.drive.raw("ETA") & 0x4F == 0x0F
@@ -66,7 +66,7 @@ def test_a_ramp_and_a_fast_stop_come_before_the_fault(reaction: int, seconds: fl
     assert bench.drive.raw("ETA") & 0x4F == 0x08
 
 
-def test_injection_brakes_before_the_fault() -> None:
+def test_dc_injection_precedes_the_fault() -> None:
     bench = running(7)
     bench.run(1.1)
     assert bench.drive.motor.braking
@@ -75,14 +75,14 @@ def test_injection_brakes_before_the_fault() -> None:
     assert not bench.drive.motor.braking
 
 
-def test_an_ignored_silence_changes_nothing() -> None:
+def test_ignored_communication_loss_changes_nothing() -> None:
     bench = running(0)
     bench.run(5)
     assert bench.drive.motor.frequency == pytest.approx(30)
     assert bench.drive.fault is None
 
 
-def test_fallback_speed_and_maintained_speed_and_stop_last_as_long_as_the_silence() -> None:
+def test_fallback_reactions_last_as_long_as_the_loss() -> None:
     for reaction, frequency in ((2, 0), (3, 10), (4, 30)):
         bench = running(reaction)
         bench.run(4)
@@ -93,7 +93,7 @@ def test_fallback_speed_and_maintained_speed_and_stop_last_as_long_as_the_silenc
         assert bench.drive.motor.frequency == pytest.approx(20, abs=0.1)
 
 
-def test_altivar_312_leaves_the_line_unwatched_when_configured_so() -> None:
+def test_altivar_312_without_monitoring_never_trips() -> None:
     bench = running(1, "atv312")
     bench.taken("CMI", 1 << 14)
     bench.run(3)
@@ -101,7 +101,7 @@ def test_altivar_312_leaves_the_line_unwatched_when_configured_so() -> None:
 
 
 @pytest.mark.parametrize(("reaction", "hertz"), [(0, 0), (1, 25), (2, 0)])
-def test_altivar_21_watches_from_the_first_frame(reaction: int, hertz: float) -> None:
+def test_altivar_21_timeout_starts_with_the_first_frame(reaction: int, hertz: float) -> None:
     bench = Bench("atv21", {"F803": 1, "F603": reaction}, run_hz=30.0)
     bench.run(8)
     assert bench.drive.fault is None, "no frame came yet"
@@ -113,14 +113,14 @@ def test_altivar_21_watches_from_the_first_frame(reaction: int, hertz: float) ->
     assert bench.drive.motor.braking == (reaction == 2)
 
 
-def test_a_time_out_of_0_is_off() -> None:
+def test_timeout_of_0_is_off() -> None:
     bench = Bench("atv21", {"F803": 0})
     bench.word("FD00")
     bench.run(10)
     assert bench.drive.fault is None
 
 
-def test_leroy_somer_trips_where_its_time_out_is_set() -> None:
+def test_leroy_somer_trips_only_if_its_timeout_is_set() -> None:
     for timeout, trips in ((0, False), (20, True)):
         bench = Bench("powerdrive", {"15.07": timeout})
         bench.word("10.40")
@@ -129,7 +129,7 @@ def test_leroy_somer_trips_where_its_time_out_is_set() -> None:
         assert bench.drive.raw("10.01") == (not trips)
 
 
-def test_a_fault_of_the_line_can_be_reset_and_comes_again() -> None:
+def test_communication_fault_can_be_reset_and_recurs() -> None:
     bench = running(1)
     bench.run(2)
     bench.taken("CMD", 0)
@@ -139,7 +139,7 @@ def test_a_fault_of_the_line_can_be_reset_and_comes_again() -> None:
     assert bench.drive.fault is not None
 
 
-def test_a_power_cycle_starts_the_watch_anew() -> None:
+def test_power_cycle_restarts_the_timeout() -> None:
     bench = running(1)
     bench.drive.power_cycle()
     bench.run(5)

@@ -69,7 +69,7 @@ def fields(program: str, path: Path, *names: str, options: tuple[str, ...] = ())
     return [line.split(";") for line in text.splitlines()]
 
 
-def test_tshark_decodes_modbus_tcp_at_once(peer: Peer, tmp_path: Path) -> None:
+def test_tshark_decodes_modbus_tcp_without_configuration(peer: Peer, tmp_path: Path) -> None:
     path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
     found = fields(
         peer("tshark", "tshark"), path,
@@ -84,7 +84,7 @@ def test_tshark_decodes_modbus_tcp_at_once(peer: Peer, tmp_path: Path) -> None:
     assert [row[1:4] for row in found[0:-1:2]] == [item[1:4] for item in found[1::2]]
 
 
-def test_tshark_finds_the_values_and_no_fault_in_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
+def test_tshark_finds_values_and_no_errors_in_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
     path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
     program = peer("tshark", "tshark")
     checked = ("-o", "ip.check_checksum:TRUE", "-o", "tcp.check_checksum:TRUE")
@@ -101,7 +101,7 @@ def test_tshark_finds_the_values_and_no_fault_in_modbus_tcp(peer: Peer, tmp_path
     assert refused == ["2"]
 
 
-def test_times_line_and_noise_are_in_the_file(peer: Peer, tmp_path: Path) -> None:
+def test_file_has_times_line_and_noise(peer: Peer, tmp_path: Path) -> None:
     path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
     found = fields(
         peer("tshark", "tshark"), path, "frame.time_epoch", "frame.interface_name", "frame.comment"
@@ -127,7 +127,7 @@ def test_tshark_reads_raw_frames_as_configured(peer: Peer, tmp_path: Path) -> No
     assert [row[2] for row in checked[:3]] == ["1", "0", "1"]
 
 
-def test_raw_packets_are_the_bytes_of_the_line() -> None:
+def test_raw_packets_have_the_bytes_of_the_line() -> None:
     form = RtuForm()
     assert form.frame_packet(1, bytes.fromhex("0318750005"), request=True).data.hex() == (
         "010318750005" + "92b3"
@@ -138,14 +138,14 @@ def test_raw_packets_are_the_bytes_of_the_line() -> None:
 
 
 @pytest.mark.parametrize("length", range(9))
-def test_every_block_is_whole_words_long_and_says_so_twice(length: int) -> None:
+def test_every_block_has_padded_and_repeated_length(length: int) -> None:
     block = packet_block(bytes(length), WALL, "x" * length)
     first, last = struct.unpack("<I", block[4:8])[0], struct.unpack("<I", block[-4:])[0]
     assert first == last == len(block)
     assert len(block) % 4 == 0
 
 
-def test_sequence_numbers_begin_anew_past_their_end() -> None:
+def test_sequence_numbers_wrap() -> None:
     form = ModbusTcpForm()
     for _ in range(0x10001):
         packet = form.frame_packet(1, bytes.fromhex("0318750005"), request=True)

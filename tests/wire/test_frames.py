@@ -29,26 +29,26 @@ WORDS = st.lists(WORD, min_size=1, max_size=20)
 
 
 @pytest.mark.parametrize("example", FRAMES, ids=lambda f: f"{f.family}-{f.number}")
-def test_every_frame_of_the_manuals_is_whole(example: Frame) -> None:
+def test_every_manual_frame_is_complete(example: Frame) -> None:
     assert is_whole(example.data)
     assert sealed(example.data[:-2]) == example.data
     assert example.printed is None or not is_whole(example.printed)
 
 
 @given(st.binary(max_size=300))
-def test_the_checksum_is_that_of_two_others(data: bytes) -> None:
+def test_checksum_matches_two_other_libraries(data: bytes) -> None:
     assert crc16(data) == witness.checksum(data)
     assert crc16(data).to_bytes(2, "little") == FramerRTU.compute_CRC(data).to_bytes(2, "big")
 
 
 @given(st.binary(max_size=40))
-def test_bytes_are_whole_where_the_witness_says_so(data: bytes) -> None:
+def test_complete_frames_match_the_reference_check(data: bytes) -> None:
     assert is_whole(data) == witness.is_sealed(data)
     assert is_whole(sealed(data)) == (len(data) >= 2)
 
 
 @given(st.binary(max_size=8), st.integers(0, 255), st.binary(min_size=1, max_size=252))
-def test_a_frame_ends_where_its_checksum_does(before: bytes, device: int, pdu: bytes) -> None:
+def test_frame_ends_with_its_checksum(before: bytes, device: int, pdu: bytes) -> None:
     data = before + frame(device, pdu)
     end = frame_end(data, len(before))
     # a shorter frame may happen to stand at its beginning
@@ -62,7 +62,7 @@ def frame_end(data: bytes, start: int = 0) -> int | None:
 
 
 @given(st.lists(st.binary(max_size=30) | st.binary(max_size=20).map(sealed)).map(b"".join))
-def test_every_whole_frame_is_found_wherever_it_begins(data: bytes) -> None:
+def test_every_complete_frame_is_found_at_any_offset(data: bytes) -> None:
     found = {}
     for start in range(len(data)):
         ends = range(start + MIN_FRAME, min(len(data), start + MAX_FRAME) + 1)
@@ -80,7 +80,7 @@ def test_unfinished_frame_does_not_end() -> None:
 
 
 @given(st.integers(1, 247), st.integers(0, 0xFF00), st.integers(0, 0xFF00), WORDS)
-def test_requests_are_those_that_the_line_sends(
+def test_requests_match_those_of_the_line(
     device: int, address: int, other: int, words: list[int]
 ) -> None:
     count = len(words)
@@ -92,5 +92,5 @@ def test_requests_are_those_that_the_line_sends(
     assert read_write_frame(device, other, count, address, words) == frame(device, both.pdu())
 
 
-def test_bytes_as_the_manuals_print_them() -> None:
+def test_bytes_are_formatted_as_in_the_manuals() -> None:
     assert hex_text(read_frame(1, 0x1875, 5)) == "01 03 18 75 00 05 92 B3"

@@ -68,7 +68,7 @@ UNKNOWN = frame(2, bytes([90, 1, 2, 3]))
     ),
     st.randoms(use_true_random=False),
 )
-def test_reads_are_found_however_they_were_read(
+def test_frames_are_found_in_any_chunks(
     reads: list[tuple[int, int, list[int]]], chance: random.Random
 ) -> None:
     frames = [
@@ -84,27 +84,27 @@ def test_reads_are_found_however_they_were_read(
     assert all(frame.whole for frame in found)
 
 
-def test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it() -> None:
+def test_reply_complete_without_its_last_byte_includes_it() -> None:
     request, reply = read_frame(160, 7, 2), reply_words(160, 1040, 1040)
     assert is_whole(reply[:-1])
     assert [frame.data for frame in split(request, reply + READ)] == [request, reply, READ]
     assert [frame.data for frame in split(request, reply[:-1], reply[-1:])] == [request, reply]
 
 
-def test_a_request_that_is_a_whole_reply_without_its_last_byte_is_found_with_it() -> None:
+def test_request_that_looks_like_a_shorter_reply_is_found_whole() -> None:
     request, reply = read_frame(70, 531, 1), reply_words(70, 0)
     assert is_whole(request[:-1])
     dribbled = [bytes([byte]) for byte in request + reply]
     assert [frame.data for frame in split(*dribbled, every=CHARACTER)] == [request, reply]
 
 
-def test_a_request_that_is_sent_again_is_found_while_its_reply_is_due() -> None:
+def test_repeated_request_is_found_while_its_reply_is_due() -> None:
     found = split(READ, READ, WORDS, pause=False, every=0.2)
     assert [frame.data for frame in found] == [READ, READ, WORDS]
 
 
 @pytest.mark.parametrize("example", FRAMES, ids=lambda f: f"{f.family}-{f.number}")
-def test_every_frame_of_the_manuals_is_found(example: Frame) -> None:
+def test_every_manual_frame_is_found(example: Frame) -> None:
     (found,) = split(example.data)
     assert (found.data, found.whole) == (example.data, True)
 
@@ -118,20 +118,20 @@ def test_each_kind_of_frame_is_found_byte_by_byte(data: bytes) -> None:
     assert [heard_frame.data for heard_frame in split(*readings, every=CHARACTER)] == [data, READ]
 
 
-def test_a_function_that_is_not_known_ends_with_a_pause() -> None:
+def test_frame_of_an_unknown_function_ends_at_a_pause() -> None:
     assert split(UNKNOWN, pause=False) == []
     (found,) = split(UNKNOWN)
     assert (found.data, found.whole) == (UNKNOWN, True)
 
 
 @given(st.binary(min_size=1, max_size=20))
-def test_noise_before_a_request_hides_it_no_longer_than_a_pause(noise: bytes) -> None:
+def test_noise_before_a_request_ends_at_a_pause(noise: bytes) -> None:
     found = split(noise, READ, WORDS)
     assert b"".join(frame.data for frame in found) == noise + READ + WORDS
     assert [frame.data for frame in found if frame.whole][-2:] == [READ, WORDS]
 
 
-def test_a_cut_reply_does_not_take_the_next_request_with_it() -> None:
+def test_truncated_reply_does_not_hide_the_next_request() -> None:
     found = split(READ, WORDS[:5], READ, pause=False)
     assert [(frame.data, frame.whole) for frame in found] == [
         (READ, True),
@@ -141,13 +141,13 @@ def test_a_cut_reply_does_not_take_the_next_request_with_it() -> None:
 
 
 @pytest.mark.parametrize("noise", [b"\x00", b"\x00\x5a", b"\x02\x10\x00"])
-def test_noise_right_before_a_request_does_not_take_it_along(noise: bytes) -> None:
+def test_noise_just_before_a_request_does_not_hide_it(noise: bytes) -> None:
     """An adapter has handed over both at once; the reply comes behind a silence."""
     found = split(noise + READ, WORDS, pause=False)
     assert [frame.data for frame in found] == [noise, READ, WORDS]
 
 
-def test_broken_frame_is_dropped() -> None:
+def test_damaged_frame_is_dropped() -> None:
     splitter = FrameSplitter()
     noise = bytes([0x55, 0x55]) * 3000
     given = b"".join(frame.data for frame in splitter.take(noise, 0.0))
@@ -156,7 +156,7 @@ def test_broken_frame_is_dropped() -> None:
     assert not splitter.waiting
 
 
-def test_pauses_are_measured_where_readings_tell_them() -> None:
+def test_pauses_are_measured_if_reads_show_them() -> None:
     splitter = FrameSplitter(CHARACTER)
     (request,) = list(splitter.take(READ, 1.0))
     assert request.begun == pytest.approx(1.0 - 8 * CHARACTER)
@@ -167,7 +167,7 @@ def test_pauses_are_measured_where_readings_tell_them() -> None:
     assert [frame.pause is None for frame in together] == [False, True]
 
 
-def test_one_reading_of_several_frames_tells_no_gap() -> None:
+def test_one_read_of_several_frames_shows_no_gap() -> None:
     assert [frame.gap for frame in split(READ + WORDS + READ)] == [0.0, 0.0, 0.0]
 
 
@@ -204,17 +204,17 @@ def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]
         ((READ, reply_words(2, 1)), [(2, 3, "unasked"), (2, 3, "none")]),
     ],
 )
-def test_results_of_requests(
+def test_requests_have_their_results(
     readings: tuple[bytes, ...], reported: list[tuple[int, int, str]]
 ) -> None:
     assert answers(*readings) == reported
 
 
-def test_a_write_that_is_sent_again_is_no_reply() -> None:
+def test_repeated_write_is_not_a_reply() -> None:
     assert answers(COMMAND, COMMAND, every=0.5) == [(2, 6, "none"), (2, 6, "none")]
 
 
-def test_an_exchange_tells_its_times_and_its_words() -> None:
+def test_exchange_has_its_times_and_words() -> None:
     (exchange,) = heard(READ, WORDS, every=0.02)
     assert exchange.turnaround == pytest.approx(0.02 - len(WORDS) * CHARACTER)
     assert (exchange.request, exchange.reply) == (READ[1:-2], WORDS[1:-2])
@@ -222,7 +222,7 @@ def test_an_exchange_tells_its_times_and_its_words() -> None:
     assert refused.exception == 2
 
 
-def test_noise_costs_no_more_the_more_of_it_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_cost_of_noise_does_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
     """At a wrong baud rate all is noise, byte after byte."""
     looked: list[int] = []
 

@@ -21,7 +21,7 @@ from tui.wire.overheard import overheard_request
         (frame(4, bytes([17])), "its identity (function 17)"),
     ],
 )
-def test_requests(data: bytes, text: str) -> None:
+def test_requests_are_described(data: bytes, text: str) -> None:
     request = overheard_request(data)
     assert request is not None
     assert (request.device, request.text) == (4, text)
@@ -38,5 +38,5 @@ def test_requests(data: bytes, text: str) -> None:
         "2B 0E 01 01 00 00 00",
     ],
 )
-def test_replies_ask_nothing(pdu: str) -> None:
+def test_replies_are_not_requests(pdu: str) -> None:
     assert overheard_request(frame(4, bytes.fromhex(pdu))) is None

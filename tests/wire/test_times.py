@@ -15,7 +15,7 @@ def test_bits_per_character(format_: str, bits: int) -> None:
     assert bits_per_character(format_) == bits
 
 
-def test_unknown_format() -> None:
+def test_unknown_format_raises() -> None:
     with pytest.raises(ValueError, match="7E1"):
         bits_per_character("7E1")
 
@@ -28,6 +28,6 @@ def test_line_and_simulator_agree_on_the_times(baud: int, format_: str) -> None:
     assert silent_seconds(baud, format_) == pytest.approx(witness.silence)
 
 
-def test_formats_that_modbus_has_not() -> None:
+def test_invalid_modbus_formats_are_refused() -> None:
     assert is_format("8E2")
     assert not any(is_format(text) for text in ("7E1", "8E3", "8X1", "8E1 ", ""))
