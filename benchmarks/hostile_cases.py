@@ -282,11 +282,11 @@ def _read_state(folder: Path, taught: Any) -> None:
     from tui.cli.shared.say import printable
     from tui.screens.keys import first_keys
     from tui.session import paths
-    from tui.session.blocks import user_words
+    from tui.session.blocks.editor import load_words, save_words
     from tui.session.connect.identify import DriveIdentity
     from tui.session.journal import Journal
     from tui.session.journal_reading import completed, read_journal, selected
-    from tui.session.settings.favorites import load_marks, save_marks
+    from tui.session.settings.editor import load_marks, save_marks
     from tui.session.settings.restore import Mark
     from tui.session.starts.record import offer
     from tui.session.starts.starts import Starts
@@ -298,8 +298,8 @@ def _read_state(folder: Path, taught: Any) -> None:
     paths.remember_addresses("tcp:x:502", "1")
     save_marks("atv71", load_marks("atv71").edited(["ACC"]))
     session = _Session()
-    words = user_words.load_words(session)  # type: ignore[arg-type]
-    user_words.save_words(session, words)  # type: ignore[arg-type]
+    words = load_words(session)  # type: ignore[arg-type]
+    save_words(session, words)  # type: ignore[arg-type]
     first_keys.was_tried()
     first_keys.remember()
     no_commands(printable(Mark(folder / "restore-tcp-x-502-1-atv71.json").interrupted, "utf-8"))

@@ -133,17 +133,17 @@ NOT_OURS = {"printed", "title", "source", "quantity", "quantities"}
 """Keys of profiles that are not checked: quotes from manuals, documents, names that stay."""
 
 EXCEPTIONS: dict[tuple[int, str, str], str] = {
-    (2, "tells", "tui/drive/profile/field_texts.py"): "a key of profiles, on lamps",
+    (2, "tells", "tui/drive/profile/json_schema.py"): "a key of profiles, on lamps",
     (9, "counted-anew", "tui/session/counters"): "a kind in the JSON of `counters`",
     (9, "mended", "tui/session"): "a kind of entry in journals, also of earlier versions",
     (18, "analogue_input_1", "tui/drive/profile/schema"): "a quantity of profiles",
     (18, "analogue_input_2", "tui/drive/profile/schema"): "a quantity of profiles",
-    (15, "stand-by", "tui/drive/value_names.py"): "a name of a value in older backups",
-    (18, "analogue", "tui/drive/value_names.py"): "a word of such names",
+    (15, "stand-by", "tui/drive/values.py"): "a name of a value in older backups",
+    (18, "analogue", "tui/drive/values.py"): "a word of such names",
     (18, "analogue", "profiles/search"): "a word that a person types",
-    (18, "favourites", "tui/session/settings/favorites.py"): "the key in stored files",
+    (18, "favourites", "tui/session/settings/editor.py"): "the key in stored files",
     (19, "asked", "tui/cli/documents"): "a JSON field of `why`, `counters` and `listen`",
-    (21, "does", "tui/drive/profile/field_texts.py"): "a key of profiles",
+    (21, "does", "tui/drive/profile/json_schema.py"): "a key of profiles",
 }
 """By check, whole text and place: the reason why a hit stays. The texts are public."""
 

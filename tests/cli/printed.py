@@ -8,9 +8,9 @@ from typing import Any
 
 import msgspec
 
+from tui.cli.derived import commands_of
+from tui.cli.derived import documents as all_forms
 from tui.cli.documents.document import Document
-from tui.cli.documents.json_schema import commands_of
-from tui.cli.documents.json_schema import documents as all_forms
 
 
 @lru_cache(maxsize=1)

@@ -10,7 +10,7 @@ import pytest
 
 from tests.programs import DRIVEPANEL, drivepanel, free_port, port_of, served
 from tui.cli.command_index import COMMANDS
-from tui.cli.documents.json_schema import commands_of, documents_schema
+from tui.cli.derived import commands_of, documents_schema
 from tui.cli.running.scan_telling import ScanTelling
 from tui.cli.shared.drive_status import status_document
 from tui.cli.shared.output import json_text

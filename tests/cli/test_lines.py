@@ -18,7 +18,7 @@ from tui.bus.share import beside
 from tui.bus.share.beside import LineLook
 from tui.bus.share.place import Owner
 from tui.cli.main import main
-from tui.cli.shared.lines import is_line
+from tui.cli.shared.line_argument import is_line
 from tui.session.connect import share_place
 from tui.session.connect.known_lines import load_memory
 from tui.session.connect.named_lines import settings_file

@@ -28,7 +28,7 @@ from tui.bus.share.place import Owner, OwnerLock, SharePlace, short_path
 from tui.cli import short_stop
 from tui.cli.main import main
 from tui.cli.short_stop import holder_address, line_keys, parse_stop, stop_at_once
-from tui.session.connect import host_names
+from tui.session.connect import line_key as line_keys_module
 from tui.session.connect.line_key import line_key
 from tui.session.connect.named_lines import is_name
 from tui.session.connect.open_line import open_line
@@ -224,7 +224,7 @@ def hosts(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     path = tmp_path_factory.mktemp("hosts") / "hosts"
     path.write_text(HOSTS)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(host_names, "HOSTS", path)
+        patch.setattr(line_keys_module, "HOSTS", path)
         patch.setattr(short_stop, "_HOSTS_FILE", str(path))
         yield
 

@@ -12,7 +12,7 @@ MEASURED = "tests/session/test_examining.py"
 DEFECTS = (
     Defect(
         "silent-drive-said-to-be-well",
-        "tui/session/diagnosis/checks.py",
+        "tui/session/diagnosis/diagnosis.py",
         "return bool(heard.requested) and heard.nothing and not heard.echoed",
         "return bool(heard.requested) and heard.nothing and bool(sight.neighbors)",
         "A script takes a line without any answer for a good one.",
@@ -36,7 +36,7 @@ DEFECTS = (
     ),
     Defect(
         "families-own-exception-taken-for-a-gateways",
-        "tui/session/diagnosis/checks.py",
+        "tui/session/diagnosis/diagnosis.py",
         "if code in codes]",
         "if code not in codes]",
         "The drive is suspected although the gateway cannot reach it.",
@@ -44,7 +44,7 @@ DEFECTS = (
     ),
     Defect(
         "latency-told-unmeasured",
-        "tui/session/diagnosis/checks.py",
+        "tui/session/diagnosis/diagnosis.py",
         "return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT",
         "return not sight.heard.damaged",
         "An adapter that delays nothing is blamed.",

@@ -305,7 +305,7 @@ DEFECTS = (
     ),
     Defect(
         "backup-without-its-end",
-        "tui/drive/settings/set_reading.py",
+        "tui/drive/settings/set_file.py",
         "if END_OF_SET not in tables:",
         "if END_OF_SET not in tables:\n        return\n    if not tables:",
         "Half a backup is restored as if it were complete.",
@@ -313,7 +313,7 @@ DEFECTS = (
     ),
     Defect(
         "parameters-not-counted",
-        "tui/drive/settings/set_reading.py",
+        "tui/drive/settings/set_file.py",
         "if reported != count:",
         "if reported is None:",
         "A backup with missing lines is restored as if it were complete.",
@@ -409,7 +409,7 @@ DEFECTS = (
     ),
     Defect(
         "help-read-with-the-profile",
-        "tui/drive/profile/guide.py",
+        "tui/drive/profile/profile.py",
         "self._read = read",
         "self._read = (lambda told=read(): told) if read else None",
         "The first picture waits for advice on faults that no drive has.",

@@ -11,7 +11,7 @@ ASYNC = "tests/session/test_api_async.py"
 DEFECTS = (
     Defect(
         "misspelt-command-opens-the-panel",
-        "tui/cli/shared/lines.py",
+        "tui/cli/shared/line_argument.py",
         "    return is_known_name(text, doubtful=True)",
         "    return True",
         "A misspelt command opens the panel, and a script hangs.",
@@ -118,7 +118,7 @@ DEFECTS = (
     ),
     Defect(
         "set-rounded-in-silence",
-        "tui/drive/settings/set_reading.py",
+        "tui/drive/settings/set_file.py",
         "        if conversion.lossy:",
         "        if not conversion.rounded:",
         "A value edited in a backup is restored as another one.",
@@ -223,7 +223,7 @@ DEFECTS = (
     ),
     Defect(
         "outer-motor-runs-on-after-a-signal",
-        "tui/session/api/end_by_signal.py",
+        "tui/session/api/running_motor.py",
         "    for guard in tuple(_guards):",
         "    for guard in _guards[-1:]:",
         "After a signal to a script with two motors, the second runs on for the ramp of the first.",

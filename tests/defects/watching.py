@@ -15,7 +15,7 @@ DEFECTS = (
     ),
     Defect(
         "one-trip-listed-for-each-panel",
-        "tui/session/trips.py",
+        "tui/session/report.py",
         "if last is not None and ongoing and not tripped:",
         "if False:",
         "The report lists a trip once for each panel that was opened on it.",

@@ -17,8 +17,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.compare import Side, compare_settings, factory_side, rows_text, side_of
 from tui.drive.settings.parameter_set import ParameterSet, SetError, SetHead, dump_set
-from tui.drive.settings.set_file import FileThere, read_set, write_file
-from tui.drive.settings.set_reading import load_set
+from tui.drive.settings.set_file import FileThere, load_set, read_set, write_file
 from tui.drive.values import is_enumeration, raw_range, type_range
 
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]

@@ -9,7 +9,7 @@ import pytest
 
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import ABSENT, END_OF_SET, SET_HEADER, SetError, dump_set
-from tui.drive.settings.set_reading import load_set
+from tui.drive.settings.set_file import load_set
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "parameter-sets.md"
 

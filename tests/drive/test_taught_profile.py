@@ -6,7 +6,7 @@ from decimal import Decimal
 
 import pytest
 
-from tui.drive.control_taking import control_taking
+from tui.drive.control_source import control_taking
 from tui.drive.orders import choose, locked_by
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile, is_verified

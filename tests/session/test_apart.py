@@ -10,8 +10,8 @@ from tui.bus.api import Reply
 from tui.bus.errors import NoAnswer
 from tui.drive.profile import library
 from tui.session.drive import DriveSession
-from tui.session.read.apart import NO_SUCH_WORD, read_apart
 from tui.session.read.reader import Reader
+from tui.session.read.retrying_reader import NO_SUCH_WORD, read_apart
 
 from .fakes import OneDrive
 

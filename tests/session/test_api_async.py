@@ -10,7 +10,6 @@ from decimal import Decimal
 
 import pytest
 
-import tui.session.api.async_line as async_line
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink
 from tui.session.api import (
@@ -213,7 +212,7 @@ async def test_cancelled_open_closes_the_line(
         opened.append(original(text, read_only=read_only, accept=accept))
         return opened[-1]
 
-    monkeypatch.setattr(async_line, "open_for_script", opening)
+    monkeypatch.setattr("tui.session.api.line.open_for_script", opening)
     with pytest.raises(TimeoutError):
         async with asyncio.timeout(0.05), open_drives_async("sim:atv71"):
             pytest.fail("the block was begun")

@@ -27,8 +27,7 @@ from tui.session.counters.compare import (
     frames_since,
     load_of,
 )
-from tui.session.counters.strays import stray_difference
-from tui.session.counters.watch import THIS_PORT, CounterWatch
+from tui.session.counters.watch import THIS_PORT, CounterWatch, stray_difference
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.journal_reading import entries_of

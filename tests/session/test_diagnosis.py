@@ -52,8 +52,7 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.session.connect.known_line import KnownLine
 from tui.session.diagnosis.asking import evidence_of_port, sight_of_drive
-from tui.session.diagnosis.checks import LADDER
-from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
+from tui.session.diagnosis.diagnosis import LADDER, Diagnosis, diagnosed
 from tui.session.diagnosis.evidence import AdapterSeen, DiagnosticEvidence
 from tui.session.diagnosis.gateway_probe import Works
 from tui.session.diagnosis.heard import Heard, heard_by_errors

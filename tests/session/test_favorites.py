@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from tui.session.paths import state_folder
-from tui.session.settings.favorites import Marks, load_marks, save_marks
+from tui.session.settings.editor import Marks, load_marks, save_marks
 
 MARKS = Marks(favorites=("ACC", "HSP"), confirmed=("LSP",), recent=("DEC",))
 STORED = {"favourites": ["ACC", "HSP"], "confirmed": ["LSP"], "recent": ["DEC"]}

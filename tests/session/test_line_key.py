@@ -66,7 +66,7 @@ def test_hosts_file_name_equals_its_address(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     hosts = tmp_path / "hosts"
-    monkeypatch.setattr("tui.session.connect.host_names.HOSTS", hosts)
+    monkeypatch.setattr("tui.session.connect.line_key.HOSTS", hosts)
     assert line_key("tcp:pump:502") == "tcp:pump:502"
     hosts.write_text("# tcp\n::1 pump\n10.0.0.7\tPump.plant  pump # 10.0.0.9 fan\n\n", "utf-8")
     assert line_key("tcp:PUMP.") == line_key("tcp:pump.plant") == line_key("tcp:10.0.0.7")

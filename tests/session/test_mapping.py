@@ -21,8 +21,8 @@ from tui.drive.blocks.user_words import COUNT, UserWord
 from tui.drive.blocks.wire_cost import block_request, span
 from tui.drive.profile import library
 from tui.drive.profile.schema import Block
+from tui.session.blocks.editor import load_words, read_words, save_words
 from tui.session.blocks.mapping import Force, Mapper, wire_timing
-from tui.session.blocks.user_words import load_words, read_words, save_words
 from tui.session.blocks.write import AssignmentRefused, write_assignment
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession

@@ -15,7 +15,7 @@ from tui.drive.settings.compare import Side, compare_settings, side_of
 from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
 from tui.drive.settings.restore_plan import NO_OPTIONS, Held, Options, RestorePlan
 from tui.drive.settings.restore_planner import plan_restore
-from tui.drive.settings.set_reading import load_set
+from tui.drive.settings.set_file import load_set
 from tui.drive.settings.writable import is_setting, line_setting
 from tui.drive.values import raw_range
 from tui.session.connect.identify import identify_drive

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tui.session.journal import FAULT_WHYS, Entry
-from tui.session.trips import Trip, trips_of
+from tui.session.report import Trip, trips_of
 
 OLD = "seen from here"
 

@@ -8,7 +8,7 @@ from tests.session.sets_bench import FAMILIES, bench
 from tui.bus.errors import LineError
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import dump_set
-from tui.drive.settings.set_reading import load_set
+from tui.drive.settings.set_file import load_set
 from tui.session.read.upload import Upload, readable_codes, setting_codes
 from tui.simulator import FaultRates
 

@@ -25,8 +25,7 @@ from tui.session.drive_state import DriveState
 from tui.session.events import EventLog
 from tui.session.reading import Reading
 from tui.session.settings.applied import Applied, EditOutcome, Result
-from tui.session.settings.editor import Editor
-from tui.session.settings.favorites import Marks
+from tui.session.settings.editor import Editor, Marks
 from tui.session.settings.watched_values import WatchedValues
 from tui.session.work import Outcome as WorkOutcome
 from tui.session.work import OutcomeKind

@@ -13,7 +13,7 @@ from tui.session.logs import start_logging
 
 from .command_index import COMMANDS
 from .shared.errors import plain_errors
-from .shared.lines import is_line
+from .shared.line_argument import is_line
 from .shared.typed import note_typed
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""Raw words and engineering values, both ways, without floats.
+"""Raw words and engineering values, both ways, without floats; names of raw values.
 
 A typed value is rounded half away from zero to what the drive can hold; a conversion says
 whether it was, and whether that made another value of it.
@@ -14,7 +14,6 @@ from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
 from .errors import ValueRefused
 from .profile.schema import Bit, Parameter
 from .units import factor_between
-from .value_names import raw_of_name
 
 LONGEST_NUMBER = 30
 """Most digits before or after the point of a typed number."""
@@ -304,3 +303,32 @@ __all__ = [
     "type_range",
     "word_count",
 ]
+
+
+FORMER_WORDS = {
+    "analogue": "analog",
+    "customised": "customized",
+    "optimised": "optimized",
+    "synchronisation": "synchronization",
+    "travelling": "traveling",
+    "stand-by": "standby",
+    "lock-out": "lockout",
+    "in force": "active",
+    "run order": "run command",
+    "dc bus kept up": "dc bus maintained",
+    "speed kept": "speed maintained",
+    "watch over the speed": "speed monitoring",
+    "cut on the output side detected": "disconnection on the output side",
+}
+"""Words of value names in versions up to 0.2.1, and the words that replaced them, case-folded."""
+
+
+def raw_of_name(typed: str, names: Mapping[int, str]) -> int | None:
+    """Return the raw value with that name in any case; None if there is none."""
+    folded = typed.casefold()
+    found = next((raw for raw, name in names.items() if name.casefold() == folded), None)
+    if found is not None:
+        return found
+    for former, present in FORMER_WORDS.items():
+        folded = folded.replace(former, present)
+    return next((raw for raw, name in names.items() if name.casefold() == folded), None)

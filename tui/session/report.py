@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime, tzinfo
 
 from tui.drive.blocks.assignment import slot_target
@@ -20,8 +20,7 @@ from tui.drive.settings.parameter_set import ParameterSet, lacking
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, set_bits
 
-from .journal import Entry
-from .trips import trips_of
+from .journal import FAULT_WHYS, Entry
 
 ENTRIES_SHOWN = 200
 """Most journal entries in a report; it has the latest ones."""
@@ -268,3 +267,39 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
 
 def _cell(text: str) -> str:
     return text.replace("|", "\\|").replace("\n", " ")
+
+
+@dataclass(frozen=True, slots=True)
+class Trip:
+    """One trip; times as texts of the journal."""
+
+    code: str
+    name: str
+    seen: str
+    """The first time that the drive was seen in this fault."""
+    tripped: str = ""
+    """The time of the trip itself; empty if it was not seen."""
+    reset: str = ""
+    """The time at which its end was seen; empty if it was not."""
+
+
+def trips_of(entries: Iterable[Entry]) -> list[Trip]:
+    """One record per trip of one drive, oldest first; `entries` are its `fault` entries.
+
+    A fault that is seen again without an end or another fault in between is the same trip.
+    """
+    found: list[Trip] = []
+    for entry in entries:
+        last = found[-1] if found else None
+        ongoing = last is not None and not last.reset and last.code in ("", entry.code)
+        if entry.answer == "reset":
+            if last is not None and ongoing:
+                found[-1] = replace(last, code=entry.code, name=entry.new, reset=entry.time)
+            continue
+        # older files say "tripped" of each fault that was there when a panel was opened
+        tripped = entry.answer == "tripped" and entry.why == FAULT_WHYS["tripped"]
+        if last is not None and ongoing and not tripped:
+            found[-1] = replace(last, code=entry.code, name=entry.new)
+        else:
+            found.append(Trip(entry.code, entry.new, entry.time, entry.time if tripped else ""))
+    return found

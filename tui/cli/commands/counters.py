@@ -128,7 +128,7 @@ async def _reset(watch: CounterWatch) -> None:
 
 def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
     """Yield the counts as titles with their texts."""
-    from tui.session.counters.turnarounds import bars
+    from tui.session.counters.compare import bars
 
     ours = found.since
     by = f"{found.counted_by}, which owns the line" if found.counted_by else "this program"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shlex
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
@@ -10,11 +11,18 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.bus.listening_line import ListeningLine
+from tui.session.capture_file import CaptureFile
+from tui.session.listening.families import Families
+from tui.session.listening.hearing import Hearing
+from tui.session.listening.listener import DecodedExchange
 from tui.session.signals import BY_SIGNAL, signal_name
+from tui.wire.heard.splitting import HeardFrame
 
 from ..shared.completion import complete_line, complete_profile
 from ..shared.errors import INTERRUPTED, LINE_TROUBLE, USAGE, Failure
 from ..shared.line_argument import LineArgument
+from ..shared.listen_outputs import HeardOutput
 from ..shared.numbers import seconds
 from ..shared.options import json_option
 from ..shared.registration import command
@@ -23,7 +31,6 @@ from ..shared.signals import interrupted_by_signal, never_suspended
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
-    from tui.session.capture_file import CaptureFile
     from tui.session.listening.place import PlaceToListen
 
 PROGRAM_NAME = "listen"
@@ -92,7 +99,6 @@ def listen(
     from tui.session.listening.families import Families, remembered_families
     from tui.session.listening.place import line_to_listen
 
-    from ..running.listening import HearingRun
     from ..shared.listen_outputs import HeardJson, HeardLines
 
     with (
@@ -180,3 +186,67 @@ def _say_begin(port: str, raw_file: Path | None) -> None:
     if raw_file is not None:
         say("To read the file:")
         say(READ_RAW.replace("FILE", shlex.quote(str(raw_file))), to_copy=True)
+
+
+class HearingRun:
+    """Passes traffic to an output and a file, and summarizes it."""
+
+    def __init__(
+        self,
+        line: ListeningLine,
+        families: Families,
+        output: HeardOutput,
+        file: CaptureFile | None = None,
+    ) -> None:
+        self._output = output
+        self._file = file
+        self._wall = time.time() - time.monotonic()
+        """Offset from the monotonic clock to seconds since 1970."""
+        self._hearing = Hearing(line, families, self._tell, self._keep)
+
+    @property
+    def text(self) -> str:
+        """Summary of the traffic and of the files, in a sentence."""
+        tally = self._hearing.listener.tally
+        text = f"Heard {tally.exchanges} exchanges in {tally.frames} frames"
+        if self._file is None:
+            return f"{text}."
+        return f"{text}; {self._file.packets} packets written to {self._file.path}."
+
+    def run(self, seconds: float | None, every: float | None) -> None:
+        """Listen for so long, or until Ctrl-C. Raises LineLost, and Failure for the file."""
+        begun = time.monotonic()
+        until = float("inf") if seconds is None else begun + seconds
+        next_sum = float("inf") if every is None else begun + every
+        while (now := time.monotonic()) < until:
+            if now >= next_sum:
+                self._sum_up(now)
+                next_sum += every or 0.0
+            left = min(until, next_sum) - now
+            self._hearing.take(*self._hearing.read(left))
+
+    def end(self) -> None:
+        """Report open requests, and the summary."""
+        now = time.monotonic()
+        self._hearing.end(now)
+        self._sum_up(now)
+
+    def _tell(self, exchange: DecodedExchange) -> None:
+        self._output.exchange(exchange, exchange.exchange.time + self._wall)
+
+    def _sum_up(self, now: float) -> None:
+        self._output.summary(self._hearing.summary(now), now + self._wall)
+
+    def _keep(self, frame: HeardFrame, request: bool | None) -> None:
+        """Write a frame to the file, if there is one."""
+        if self._file is None:
+            return
+        wall = frame.ended + self._wall
+        try:
+            if request is None:
+                self._file.add_noise(frame.data, wall)
+            else:
+                self._file.add_frame(frame.device, frame.pdu, wall, request=request)
+        except OSError as error:
+            text = f"{self._file.path} cannot be written: {error.strerror or error}."
+            raise Failure(text, USAGE) from error

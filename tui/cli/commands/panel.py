@@ -9,8 +9,7 @@ import click
 from ..opening import DEMO_LINE, LEAVE_RUNNING, STOP, open_panel, terminal_trouble
 from ..shared.completion import complete_line
 from ..shared.errors import USAGE, Failure
-from ..shared.line_argument import LineArgument, share_group_option
-from ..shared.lines import is_line
+from ..shared.line_argument import LineArgument, is_line, share_group_option
 from ..shared.options import SLAVE_ADDRESS, one_device, read_only_option
 from ..shared.registration import command
 

@@ -106,7 +106,7 @@ async def _proved(
 ) -> ProofResult:
     """The proof, on record; a motor that turned is stopped, whatever the end."""
     from tui.session.proof.prover import NothingToProve, Prover
-    from tui.session.proof.record import proof_entry
+    from tui.session.proof.result import proof_entry
 
     session = console.session
     prover = Prover(session, console.journal, session.work.permit(), turning)

@@ -49,8 +49,8 @@ def read(
     A CODE is the drive's own (ACC, 1.05, F875), the manual's number (W9001, 16#FD00) or a wire
     address (9001), in upper or lower case.
     """
-    from tui.session.read.apart import read_apart
     from tui.session.read.reader import Reader
+    from tui.session.read.retrying_reader import read_apart
 
     from ..documents.drive_documents import ReadDocument
     from ..shared.output import drive_fields, print_readings, value_field

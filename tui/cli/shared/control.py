@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from tui.drive.control_taking import ControlTaking
+    from tui.drive.control_source import ControlTaking
     from tui.session.drive import DriveSession
 
     from ..documents.parts import ControlField
@@ -18,7 +18,7 @@ GIVES_BACK = f"drivepanel {GIVE_BACK_OPTION} gives it back, in the panel g on Mo
 
 def taking_of(session: DriveSession) -> ControlTaking | None:
     """Return the possible changes of a drive's control, from the values read."""
-    from tui.drive.control_taking import control_taking
+    from tui.drive.control_source import control_taking
 
     return control_taking(session.profile, session.image.raws)
 

@@ -16,8 +16,12 @@ if TYPE_CHECKING:
 
     from ..documents.counter_parts import OurCountersField
     from ..documents.document import Document, DriveFields
-    from ..documents.drive_documents import CountersDocument
-    from ..documents.why_document import CertaintyText, MeasuredReads, WhyDocument
+    from ..documents.drive_documents import (
+        CertaintyText,
+        CountersDocument,
+        MeasuredReads,
+        WhyDocument,
+    )
 
 
 def drive_documents() -> DriveDocuments:
@@ -53,8 +57,8 @@ def why_document(
     line_text: str, device: int, fields: DriveFields | None, found: Diagnosis
 ) -> WhyDocument:
     """The diagnosis as a document; `fields` are those of a drive with a session."""
+    from ..documents.drive_documents import WhyDocument
     from ..documents.parts import HeardField
-    from ..documents.why_document import WhyDocument
 
     sight, heard = found.sight, found.sight.heard
     late, profile = sight.turnaround, sight.profile
@@ -94,7 +98,7 @@ def why_document(
 
 def _measured_reads(found: Diagnosis) -> MeasuredReads | None:
     """The counts of the short reads; None where there were none."""
-    from ..documents.why_document import MeasuredReads
+    from ..documents.drive_documents import MeasuredReads
 
     measure = found.sight.measure
     if measure is None:
@@ -162,7 +166,7 @@ def counters_document(
 
 
 def _ours_field(ours: DeviceCounters) -> OurCountersField:
-    from tui.session.counters.turnarounds import bars
+    from tui.session.counters.compare import bars
 
     from ..documents.counter_parts import OurCountersField, TurnaroundField
 

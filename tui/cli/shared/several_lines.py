@@ -17,8 +17,14 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.core import ParameterSource
 
-from .line_argument import LineArgument, mind_the_line, named_line_of, takes_line_as
-from .lines import is_known_name, is_written_out
+from .line_argument import (
+    LineArgument,
+    is_known_name,
+    is_written_out,
+    mind_the_line,
+    named_line_of,
+    takes_line_as,
+)
 from .looking_after import guard_motors, say_shared, to_its_end
 from .options import CONNECT_WITHIN, Target, usual_settings
 from .signals import never_suspended

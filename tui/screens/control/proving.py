@@ -13,7 +13,7 @@ from tui.bus.errors import LineClosed
 from tui.bus.link import SerialLink
 from tui.session.drive import DriveSession
 from tui.session.proof.prover import Prover
-from tui.session.proof.record import proof_entry
+from tui.session.proof.result import proof_entry
 from tui.session.timeout_report import TimeoutWatch
 from tui.session.work import OutcomeKind, Permit, Task
 from tui.widgets.drawing import wrapped

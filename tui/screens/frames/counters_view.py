@@ -7,8 +7,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
-from tui.session.counters.compare import Comparison
-from tui.session.counters.turnarounds import TurnaroundBar, bars
+from tui.session.counters.compare import Comparison, TurnaroundBar, bars
 from tui.session.counters.watch import CountersNow
 from tui.widgets.drawing import cut_at_word, rule, short, wrapped
 from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNING, STRONG

@@ -10,9 +10,8 @@ from tui.drive.errors import DriveError
 from ..running.errors import MotorStopped, MotorTripped, NotStopped
 from ..settings.typed import WouldRound
 from .async_drive import AsyncDrive
-from .async_line import AsyncDriveLine, open_drives_async
 from .drive import Drive
-from .line import DriveLine, open_drives
+from .line import AsyncDriveLine, DriveLine, open_drives, open_drives_async
 from .running_motor import AsyncRunningMotor, RunningMotor
 from .values import DriveValue, NotWritten, Sample
 

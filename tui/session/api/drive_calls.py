@@ -1,10 +1,13 @@
-"""The calls to one drive, which `Drive` waits for and `AsyncDrive` awaits."""
+"""The calls to one drive, which `Drive` waits for and `AsyncDrive` awaits, and its cycles."""
 
 from __future__ import annotations
 
+import asyncio
 import math
+from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from datetime import UTC, datetime
 
 from tui.bus.api import ModbusLine
 from tui.drive.chart import Direction
@@ -13,16 +16,70 @@ from tui.drive.errors import DriveError
 from ..arming import NotArmed
 from ..command.stop_report import StopSummary
 from ..console import DriveConsole
+from ..drive import DriveSession
 from ..fleet import Fleet
+from ..monitor.monitor import Monitor
+from ..monitor.snapshot import Snapshot, as_read
 from ..read.reader import Reader
+from ..reading import reading_of
 from ..running.errors import NotStopped
 from ..settings.apply import apply_edits
 from ..settings.eeprom import save_to_eeprom
 from ..settings.typed import stage_typed
 from ..work import Permit
 from .guarded_run import GuardedRun, GuardedRuns
-from .samples import SampleFeed
-from .values import DriveValue, NotWritten, value_from
+from .values import DriveValue, NotWritten, Sample, value_from
+
+SHORTEST_CYCLE, LONGEST_CYCLE = 0.05, 86400.0
+"""Seconds of a cycle of `Drive.watch`."""
+SAMPLES_WAITING = 64
+"""Cycles kept for a script that is slower than the line; older ones are dropped."""
+
+
+class SampleFeed:
+    """Watches a drive until it is closed. Raises DriveError for an impossible cycle time."""
+
+    def __init__(self, session: DriveSession, named: Mapping[str, str], every: float) -> None:
+        """`named` maps each code, as requested, to the drive's own."""
+        if not SHORTEST_CYCLE <= every <= LONGEST_CYCLE:
+            raise DriveError(f"every={every} is not a cycle time. Use 0.05 to 86400 seconds.")
+        self._session = session
+        self._named = named
+        self._waiting: deque[Snapshot] = deque(maxlen=SAMPLES_WAITING)
+        self._arrived = asyncio.Event()
+        self._since = -math.inf
+        self._monitor = Monitor(session)
+        self._monitor.listen(self._take)
+        self._monitor.start(list(named.values()), every)
+
+    async def next(self) -> Sample:
+        """Wait for the next cycle; runs in the line's loop."""
+        while not self._waiting:
+            self._arrived.clear()
+            await self._arrived.wait()
+        snapshot = self._waiting.popleft()
+        sample = self._sample(snapshot)
+        self._since = snapshot.time
+        return sample
+
+    def close(self) -> None:
+        """Stop watching; any thread may call."""
+        self._monitor.stop()
+
+    def _take(self, snapshot: Snapshot) -> None:
+        self._waiting.append(snapshot)
+        self._arrived.set()
+
+    def _sample(self, snapshot: Snapshot) -> Sample:
+        profile, clock = self._session.profile, self._session.clock
+        cycle = as_read(profile, list(dict.fromkeys(self._named.values())), snapshot, self._since)
+        values = {
+            requested: value_from(reading_of(cycle.readings[code]), clock)
+            for requested, code in self._named.items()
+        }
+        time = datetime.fromtimestamp(snapshot.wall, UTC)
+        return Sample(time, values, cycle.state.headline, snapshot.error)
+
 
 STANDS_WITHIN = 120.0
 """Seconds in which a motor must reach standstill after a stop."""

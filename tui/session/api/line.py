@@ -1,14 +1,17 @@
-"""A line for a script, opened by its text or its name."""
+"""A line for a script, opened by its text or its name; blocking, or in an asyncio loop."""
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
 from types import TracebackType
 from typing import Self
 
 from ..connect.open_line import OpenLine
+from .async_drive import AsyncDrive
 from .drive import Drive
 from .line_calls import LineCalls, open_for_script
-from .work import waited
+from .work import awaited, uninterrupted, waited
 
 
 def open_drives(text: str, *, read_only: bool = False, accept: bool = False) -> DriveLine:
@@ -55,3 +58,34 @@ class DriveLine(ScriptedLine):
         trace: TracebackType | None,
     ) -> None:
         self.close()
+
+
+class AsyncDriveLine(ScriptedLine):
+    """An open line, as `DriveLine`; tasks of any asyncio loop may call."""
+
+    async def drive(self, address: int = 1, profile: str | None = None) -> AsyncDrive:
+        """As `DriveLine.drive`."""
+        calls = self._calls
+        return AsyncDrive(await awaited(calls.line, lambda: calls.drive(address, profile)))
+
+    async def close(self) -> None:
+        """As `DriveLine.close`; closed to the end even if this task is cancelled."""
+        await uninterrupted(self._calls.close)
+
+
+@asynccontextmanager
+async def open_drives_async(
+    text: str, *, read_only: bool = False, accept: bool = False
+) -> AsyncIterator[AsyncDriveLine]:
+    """Open a line for a block, as `open_drives` does. Raises LineError."""
+    opened: list[AsyncDriveLine] = []
+
+    def work() -> None:
+        opened.append(AsyncDriveLine(open_for_script(text, read_only=read_only, accept=accept)))
+
+    try:
+        await uninterrupted(work)
+        yield opened[0]
+    finally:
+        for line in opened:
+            await line.close()

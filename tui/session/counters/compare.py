@@ -1,4 +1,4 @@
-"""Comparison of a drive's counters with the requests to it: roll-over, saturation, differences.
+"""Comparison of a drive's counters with the requests to it, and its turnarounds.
 
 Pure. The growth between two readings is compared. While other frames are on the line, the number
 of frames sent before the drive read its own counter is known only within bounds. Only certain
@@ -7,11 +7,11 @@ differences are reported.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Literal
 
-from tui.bus.api import DeviceCounters, LineCounters
+from tui.bus.api import TURNAROUND_EDGES, DeviceCounters, LineCounters
 
 MODULO = 0x10000
 MOST = 0xFFFF
@@ -218,3 +218,22 @@ def load_of(now: LineCounters, before: LineCounters, seconds: float) -> float | 
     """Return the share of the time in which the line was busy, 0 to 1; None if not known."""
     busy = now.busy_seconds - before.busy_seconds
     return min(1.0, busy / seconds) if seconds > 0 and busy >= 0 else None
+
+
+@dataclass(frozen=True, slots=True)
+class TurnaroundBar:
+    """Bar of the histogram: replies up to a turnaround in ms; None for all longer ones."""
+
+    up_to_ms: int | None
+    count: int
+
+    @property
+    def label(self) -> str:
+        """Range of the bar as text, for example `up to 20 ms`."""
+        return f"up to {self.up_to_ms} ms" if self.up_to_ms is not None else "longer"
+
+
+def bars(turnarounds: Sequence[int]) -> list[TurnaroundBar]:
+    """Return the bars for the counts of a device, shortest turnaround first."""
+    edges = [*(round(1000 * edge) for edge in TURNAROUND_EDGES), None]
+    return [TurnaroundBar(edge, count) for edge, count in zip(edges, turnarounds, strict=True)]

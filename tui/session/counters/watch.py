@@ -1,18 +1,21 @@
-"""Counters of one drive: this program's and the drive's own, read repeatedly and compared."""
+"""Counters of one drive, read repeatedly and compared, and frames that answer no request."""
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 
 from tui.bus.api import DeviceCounters, LastMinute, LineCounters, Priority
 from tui.bus.errors import LineError, RequestRefused
 from tui.bus.link import TcpLink
+from tui.bus.trace import Frame
 from tui.drive.chart import watched_codes
 from tui.drive.profile.schema import PortCounters
 
+from ..connect.other_masters import overheard
 from ..diagnosis.asking import last_time
+from ..diagnosis.measure import measure_of
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
 from ..read.reader import Reader
@@ -26,7 +29,34 @@ from .compare import (
     load_of,
     own_differences,
 )
-from .strays import stray_difference
+
+LIKELY = "late or repeated replies, a second drive at the address, or another master"
+
+
+def stray_difference(
+    count: int, frames: Sequence[Frame], since: float, device: int, *, tcp: bool
+) -> list[Difference]:
+    """Return a difference for this number of strays, or an empty list for 0.
+
+    The recorded frames after `since` (line's clock) show their kinds, if they are still recorded.
+    """
+    if count <= 0:
+        return []
+    frames = [frame for frame in frames if frame.time > since]
+    found = measure_of(frames, device, tcp=tcp)
+    kinds = (
+        (found.duplicated, "copies of replies"),
+        (found.late, "replies after their timeout"),
+        (found.second, "second replies with other values"),
+        (found.behind, "replies to the request before"),
+        (found.foreign, "replies of other addresses"),
+    )
+    seen = ", ".join(f"{number} {text}" for number, text in kinds if number) or LIKELY
+    master = "" if tcp or not (heard := overheard(frames, since)).requests else f" {heard.text}"
+    whole = "1 frame answers" if count == 1 else f"{count} frames answer"
+    text = f"{whole} no program's request: {seen}.{master} drivepanel why names the cause."
+    return [Difference("strays", count, text)]
+
 
 DIAGNOSTICS = 8
 ECHO, RESET, DAMAGED, FRAMES = 0x00, 0x0A, 0x0C, 0x0E

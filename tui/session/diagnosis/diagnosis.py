@@ -1,12 +1,254 @@
-"""Diagnosis of a drive that does not answer, in one sentence, with the next steps; pure."""
+"""Diagnosis of a drive that does not answer, in one sentence, with the next steps.
+
+Pure functions of the evidence. The first check whose test holds is the verdict.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from .checks import LADDER
+from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
+from tui.bus.limits import STANDARD_EXCEPTIONS
+
+from . import next_steps as steps
 from .evidence import DiagnosticEvidence
+from .garbled import speed_text
+from .gateway_probe import GATEWAY_CODES, gateway_codes
 from .sick import CERTAIN
+from .sick_rungs import GATEWAY_RUNGS, SICK_RUNGS, Check, first_sentence
+
+HELD_BACK = 8
+"""Latency of an adapter in ms from which it is reported."""
+SEEN_OF_IT = 0.75
+"""Share of that latency by which the answers must be late before the adapter is blamed."""
+
+
+def _not_there(sight: DiagnosticEvidence) -> bool:
+    missing = isinstance(sight.trouble, PortMissing)
+    gone = sight.port is not None and not sight.port.there
+    return missing or (gone and not sight.heard.answered)
+
+
+def _renumbered(sight: DiagnosticEvidence) -> bool:
+    return bool(sight.adapter.was) and (bool(sight.adapter.now) or not _not_there(sight))
+
+
+def _says_renumbered(sight: DiagnosticEvidence) -> str:
+    now = f"is {sight.adapter.now} now" if sight.adapter.now else "is not plugged in"
+    if _not_there(sight):
+        return f"{sight.path} is not there: the adapter that it was {now}."
+    return f"{sight.path} is another adapter than it was; the one that it was {now}."
+
+
+def _busy(sight: DiagnosticEvidence) -> bool:
+    if isinstance(sight.trouble, PortBusy | NotShared) or sight.owner_frozen:
+        return True
+    port = sight.port
+    if port is None:
+        return False
+    lost = isinstance(sight.trouble, LineLost) and bool(port.holder)
+    return lost or (bool(port.others) and not sight.heard.answered)
+
+
+def _describe_busy(sight: DiagnosticEvidence) -> str:
+    port = sight.port
+    if isinstance(sight.trouble, PortBusy):
+        by = sight.trouble.holder or (port.holder if port else "") or "another program"
+        return f"{sight.path} is in use by {by}."
+    if isinstance(sight.trouble, NotShared) or port is None or sight.owner_frozen:
+        return first_sentence(str(sight.trouble))
+    if port.others:
+        return f"{port.others} has {sight.path} open too, and takes what the drive answers."
+    return f"{sight.path} is in use by {port.holder}."
+
+
+def _forbidden(sight: DiagnosticEvidence) -> bool:
+    port = sight.port
+    return port is not None and port.there and not port.permitted
+
+
+def _says_forbidden(sight: DiagnosticEvidence) -> str:
+    port = sight.port
+    assert port is not None
+    if not port.group:
+        return f"{port.user or 'This user'} may not use {port.path}, and no group of users may."
+    why = "is in it since the next log-in only" if port.in_group else "is not in it"
+    return f"{port.path} may be used by the group {port.group} alone, and {port.user} {why}."
+
+
+def _slow_adapter(sight: DiagnosticEvidence) -> bool:
+    held = sight.port.latency if sight.port is not None else None
+    late = sight.turnaround
+    if held is None or late is None or held < HELD_BACK or not sight.heard.answered:
+        return False
+    return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT
+
+
+def _says_slow(sight: DiagnosticEvidence) -> str:
+    assert sight.port is not None
+    assert sight.turnaround is not None
+    return (
+        f"The drive answers, {sight.turnaround * 1000:.0f} ms after each request: the adapter keeps"
+        f" bytes back for up to {sight.port.latency} ms (its latency timer)."
+    )
+
+
+def _garbled(sight: DiagnosticEvidence) -> bool:
+    heard = sight.heard
+    if heard.answered or heard.others or heard.exceptions or heard.functions or heard.misshapen:
+        return False
+    return bool(heard.garbage) or bool(sight.broken)
+
+
+def _says_garbled(sight: DiagnosticEvidence) -> str:
+    errors, reported = sight.errors, speed_text(sight)
+    counted = [
+        f"{count} {what}"
+        for count, what in (
+            (errors.framing, "without a stop bit"),
+            (errors.parity, "with a wrong parity"),
+            (errors.breaks, "breaks"),
+        )
+        if count
+    ]
+    if counted:
+        seen = f"the port counted {' and '.join(counted)}"
+        reported = f"{seen}; {reported}" if reported else seen
+    return (
+        f"The baud or the format of the line is not that of the drive: {reported or _loose(sight)}."
+    )
+
+
+def _loose(sight: DiagnosticEvidence) -> str:
+    return f"{sight.heard.garbage} bytes came back that form no frame"
+
+
+def _late(sight: DiagnosticEvidence) -> bool:
+    return bool(sight.heard.late) and not sight.heard.answered
+
+
+def _silent(sight: DiagnosticEvidence) -> bool:
+    heard = sight.heard
+    return bool(heard.requested) and heard.nothing and not heard.echoed
+
+
+def _says_silent(sight: DiagnosticEvidence) -> str:
+    if sight.neighbors:
+        others = ", ".join(map(str, sight.neighbors))
+        return f"No device answers at address {sight.device}, while {others} on this line does."
+    return f"No device answers at address {sight.device}: not one byte came back."
+
+
+def _damaged(sight: DiagnosticEvidence) -> bool:
+    heard = sight.heard
+    return bool(heard.damaged) or bool(heard.answered and (heard.garbage or sight.broken))
+
+
+def _says_damaged(sight: DiagnosticEvidence) -> str:
+    heard = sight.heard
+    broken = f" ({sight.broken} characters the port itself saw broken)" if sight.broken else ""
+    count = heard.damaged or 1
+    return (
+        f"The drive answers, and {count} of {heard.requested} answers came damaged: the checksum"
+        " does"
+        f" not fit{broken}."
+    )
+
+
+def _gateway_codes(sight: DiagnosticEvidence) -> list[int]:
+    """Exception codes of a gateway, unless the family has its own meaning for them."""
+    codes = gateway_codes(sight.profile)
+    return [code for code in sight.heard.exceptions if code in codes]
+
+
+def _refused(sight: DiagnosticEvidence) -> bool:
+    return bool(sight.heard.exceptions) and not sight.heard.answered and not _gateway_codes(sight)
+
+
+def _says_refused(sight: DiagnosticEvidence) -> str:
+    code = sight.heard.exceptions[-1]
+    known = sight.profile.data.exceptions if sight.profile is not None else []
+    meaning = next((e.meaning for e in known if e.code == code), STANDARD_EXCEPTIONS.get(code, ""))
+    why = f": {meaning.rstrip('.')}" if meaning else ""
+    return f"The drive is there, and refuses what is asked with exception {code}{why}."
+
+
+LADDER: tuple[Check, ...] = (
+    Check("renumbered", _renumbered, _says_renumbered, steps.find_adapter),
+    Check(
+        "changed",
+        lambda s: bool(s.changed) and bool(s.heard.answered),
+        lambda s: first_sentence(s.changed),
+        steps.accept_change,
+    ),
+    Check("no-port", _not_there, lambda s: f"There is no port {s.path}.", steps.plug_in),
+    Check("no-permission", _forbidden, _says_forbidden, steps.get_permission),
+    *GATEWAY_RUNGS,
+    Check("busy", _busy, _describe_busy, steps.free_port),
+    Check(
+        "port-refused",
+        lambda s: isinstance(s.trouble, PortRefused),
+        lambda s: first_sentence(str(s.trouble)),
+        steps.other_port,
+    ),
+    Check(
+        "line-lost",
+        lambda s: s.trouble is not None,
+        lambda s: first_sentence(str(s.trouble)),
+        steps.reach_line,
+    ),
+    Check("withheld", lambda s: bool(s.withheld), lambda s: first_sentence(s.withheld), steps.wait),
+    *SICK_RUNGS,
+    Check("slow-adapter", _slow_adapter, _says_slow, steps.hurry_adapter),
+    Check("wrong-settings", _garbled, _says_garbled, steps.mend_settings),
+    Check("silence", _silent, _says_silent, steps.end_silence),
+    Check(
+        "late",
+        _late,
+        lambda s: f"Address {s.device} answers, but after the time that is waited for it.",
+        steps.wait_longer,
+    ),
+    Check(
+        "echo",
+        lambda s: bool(s.heard.echoed) and not s.heard.answered and s.heard.nothing,
+        lambda s: (
+            f"Only the adapter's own echo came back: no device answers at address {s.device}."
+        ),
+        steps.end_echo,
+    ),
+    Check("checksum", _damaged, _says_damaged, steps.end_damage),
+    Check(
+        "other-address",
+        lambda s: bool(s.heard.others) and not s.heard.answered,
+        lambda s: (
+            f"Address {', '.join(map(str, s.heard.others))} answers what address {s.device} was"
+            " asked."
+        ),
+        steps.sort_addresses,
+    ),
+    Check(
+        "wrong-function",
+        lambda s: bool(s.heard.functions or s.heard.misshapen),
+        lambda s: (
+            f"Address {s.device} answers something else than asked: "
+            + (
+                f"function {s.heard.functions[0]}."
+                if s.heard.functions
+                else "not as many registers as were asked for."
+            )
+        ),
+        steps.find_second_master,
+    ),
+    Check(
+        "gateway",
+        lambda s: bool(_gateway_codes(s)) and not s.heard.answered,
+        lambda s: f"The gateway answers {GATEWAY_CODES[_gateway_codes(s)[-1]]}.",
+        steps.ask_gateway,
+    ),
+    Check("exception", _refused, _says_refused, steps.ask_otherwise),
+)
+"""All checks, in the order in which they are tried; each test but the first ones' works alone."""
+
 
 ANSWERS = "answers"
 """Verdict for a drive that answers, with no fault on the way."""

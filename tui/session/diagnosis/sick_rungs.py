@@ -1,17 +1,19 @@
-"""Checks that need many reads, and those of a gateway."""
+"""Form of a check of a diagnosis; checks that need many reads, and those of a gateway."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import partial
 
 from tui.bus.errors import ONE_BEHIND
 
 from . import next_steps as steps
-from .check import Check, first_sentence
 from .evidence import DiagnosticEvidence
 from .gateway_probe import Works
 from .measure import Measure
 from .sick import (
+    CERTAIN,
     LIKELY,
     POSSIBLE,
     SICK_FRAMES,
@@ -21,6 +23,27 @@ from .sick import (
     sureness,
     swapped,
 )
+
+Steps = Callable[[DiagnosticEvidence], Iterable[str]]
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """Check for one possible cause."""
+
+    id: str
+    fails: Callable[[DiagnosticEvidence], bool]
+    says: Callable[[DiagnosticEvidence], str]
+    """Cause as one sentence."""
+    steps: Steps
+    certainty: Callable[[DiagnosticEvidence], str] = lambda _: CERTAIN
+    others: tuple[str, ...] = ()
+    """Other possible causes, if the verdict is not certain."""
+
+
+def first_sentence(text: str) -> str:
+    """The first sentence of a text."""
+    return text.partition(". ")[0].rstrip(".") + "."
 
 
 def _measure(sight: DiagnosticEvidence) -> Measure:

@@ -1,4 +1,4 @@
-"""Result of a communication loss test, in words and figures. Pure."""
+"""Result of a communication loss test, in words and figures, and its journal entry."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from tui.drive.profile.schema import Reaction
 
+from ..drive import DriveSession
+from ..journal import Entry, now_text
 from .silences import Bracket
 
 UNNAMED_FAULT = "a fault"
@@ -70,3 +72,15 @@ class ProofResult:
         if not self.bracket.holds(self.configured):
             return f"the timeout is set to {self.configured:g} s."
         return f"the fault should be {self.expected_fault or 'none'}."
+
+
+def proof_entry(session: DriveSession, result: ProofResult) -> Entry:
+    """The journal entry of a test: nothing was written, `new` holds the result."""
+    rules = session.profile.data.communication_fault
+    code = rules.timeout if rules else ""
+    address = session.profile[code].address if code else 0
+    return Entry(
+        now_text(), session.line_text, session.device, session.profile.id, code, address,
+        None, "", 0, result.text, "as set" if result.as_set else "NOT AS SET", None,
+        "test of the communication timeout", kind="proof",
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Reading raw values with retries, for work that one lost reply must not stop."""
+"""Reads with retries, for work that one lost reply or missing word must not stop."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ..drive import DriveSession
 from ..drive_state import drive_state
 from ..reading import Reading
 from .order_check import check_byte_order
+from .presence import look_for_drive, meets_silence
 from .reader import Reader
 
 READ_TRIES = 3
@@ -106,3 +107,31 @@ class RetryingReader:
         state = drive_state(profile, await self.ask(code for code in codes if code))
         self.headline = state.headline or state.kind
         return state.motion
+
+
+NO_SUCH_WORD = "no answer, while the drive answers otherwise: perhaps it has no such word"
+
+
+async def read_apart(reader: Reader, codes: Iterable[str]) -> dict[str, Reading]:
+    """Read parameters that a person chose; one without an answer gets a bad reading.
+
+    Reads them together, or one at a time if that gets no answer but the drive is present.
+    Raises the line's errors, and NoAnswer if the drive answers nothing at all.
+    """
+    wanted = list(dict.fromkeys(codes))
+    try:
+        return await reader.read(wanted)
+    except NoAnswer as error:
+        if not meets_silence(reader.profile):
+            raise
+        await look_for_drive(reader.session, error)
+    return {code: await _alone(reader, code) for code in wanted}
+
+
+async def _alone(reader: Reader, code: str) -> Reading:
+    try:
+        return (await reader.read([code]))[code]
+    except NoAnswer as error:
+        await look_for_drive(reader.session, error)
+        now = reader.session.clock.monotonic()
+        return Reading.bad(reader.profile[code], now, NO_SUCH_WORD)

@@ -6,9 +6,10 @@ drive, in the line's loop. Everything else belongs to the thread of the screen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from tui.bus.errors import LineError
@@ -23,14 +24,67 @@ from tui.drive.settings.writable import Refusal, write_refusal
 from ..drive import DriveSession
 from ..drive_state import DriveState
 from ..journal import Journal
+from ..paths import state_folder
 from ..read.retrying_reader import RetryingReader
+from ..stored import store_json, stored_json
 from ..work import Outcome, OutcomeKind, Permit, Task
 from .applied import Applied, LinkChange, Result
 from .apply import apply_edits
 from .eeprom import factory_reset, save_to_eeprom
-from .favorites import Marks, load_marks, save_marks
 from .staging import Staging
 from .watched_values import WatchedValues
+
+RECENT_KEPT = 30
+STORED_KEYS = {"favorites": "favourites", "confirmed": "confirmed", "recent": "recent"}
+"""Key in the stored file by field; files of earlier versions have the same keys."""
+
+
+@dataclass(frozen=True, slots=True)
+class Marks:
+    """Marked codes of one drive family."""
+
+    favorites: tuple[str, ...] = ()
+    confirmed: tuple[str, ...] = ()
+    """Unverified parameters whose address a person has compared with the keypad."""
+    recent: tuple[str, ...] = ()
+    """The last edited first."""
+
+    def toggled(self, code: str) -> Marks:
+        """Return marks with a code added to the favorites, or removed."""
+        if code in self.favorites:
+            return replace(self, favorites=tuple(c for c in self.favorites if c != code))
+        return replace(self, favorites=(*self.favorites, code))
+
+    def with_confirmed(self, code: str) -> Marks:
+        """Return marks with a code added to the confirmed ones."""
+        return replace(self, confirmed=tuple(dict.fromkeys((*self.confirmed, code))))
+
+    def edited(self, codes: Iterable[str]) -> Marks:
+        """Return marks with these codes as the ones edited last."""
+        return replace(self, recent=tuple(dict.fromkeys((*codes, *self.recent)))[:RECENT_KEPT])
+
+
+def load_marks(profile_id: str) -> Marks:
+    """Return the stored marks; empty if the file is missing or damaged."""
+    reported = stored_json(_file(profile_id))
+    stored = reported if isinstance(reported, dict) else {}
+    return Marks(**{name: _texts(stored.get(key)) for name, key in STORED_KEYS.items()})
+
+
+def _texts(found: object) -> tuple[str, ...]:
+    return tuple(item for item in found if isinstance(item, str)) if isinstance(found, list) else ()
+
+
+def save_marks(profile_id: str, marks: Marks) -> None:
+    """Store the marks; errors of the folder are ignored."""
+    with suppress(OSError):
+        fields = asdict(marks)
+        store_json(_file(profile_id), {key: fields[name] for name, key in STORED_KEYS.items()})
+
+
+def _file(profile_id: str) -> Path:
+    return state_folder() / f"marks-{profile_id}.json"
+
 
 LEFT_NAMED = 8
 """Number of staged codes that a text names; the others are counted."""

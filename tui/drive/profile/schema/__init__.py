@@ -20,7 +20,6 @@ from .base import (
     When,
     WordAddress,
 )
-from .block import Block, BlockChoice
 from .channel import ChannelRow, Channels, ChannelSwitch
 from .chart import (
     ChannelBits,
@@ -40,7 +39,6 @@ from .chart import (
     TeachableReference,
     Transition,
 )
-from .control_source import ControlSource, Setting, Way
 from .fault_help import (
     AlarmHelp,
     FaultHelp,
@@ -74,7 +72,6 @@ from .link import (
     PortCounters,
     ReadShapes,
 )
-from .memory import MemoryOrder, MemoryOrders
 from .monitoring import (
     AfterReset,
     CommunicationFault,
@@ -103,8 +100,17 @@ from .parameter import (
     WordType,
 )
 from .search import FamilySearch, FamilyTopic, SearchTopic, SearchWords
-from .start_up import StartUpStep
-from .whole import ProfileData
+from .whole import (
+    Block,
+    BlockChoice,
+    ControlSource,
+    MemoryOrder,
+    MemoryOrders,
+    ProfileData,
+    Setting,
+    StartUpStep,
+    Way,
+)
 from .wiring import FamilyWarning, Lamp, Opening, SignalName, Wiring
 
 __all__ = [

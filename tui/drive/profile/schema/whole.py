@@ -1,12 +1,14 @@
-"""A whole profile file."""
+"""A whole profile file, with its blocks, control sources, memory commands and first steps."""
 
 from __future__ import annotations
 
-from .base import Table
-from .block import Block
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .base import Confidence, Effective, Identifier, RawWord, ReadCount, Table, When, WordAddress
 from .channel import Channels
 from .chart import Chart, CommandExample, ReferenceWay, TeachableReference
-from .control_source import ControlSource
 from .identification import Erratum, Identification, ProfileHead, Source
 from .link import (
     Addresses,
@@ -18,11 +20,118 @@ from .link import (
     PortCounters,
     ReadShapes,
 )
-from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter, ParameterGroup
-from .start_up import StartUpStep
 from .wiring import Wiring
+
+
+class StartUpStep(Table, frozen=True, kw_only=True):
+    """One step of a first commissioning; the steps are in their order.
+
+    Their parameters, in this order, are the group Simply start of the editor.
+    """
+
+    step: str
+    """Short name of the step."""
+    text: str
+    """Decision or task for the technician at the machine."""
+    parameters: list[str] = []
+    """Codes in the order in which they are set or checked."""
+    action: Literal["", "auto-tune", "save", "first-run", "take-control"] = ""
+    """Action of the step besides setting values."""
+    stopped_only: bool = False
+    note: str = ""
+    source: str
+    confidence: Confidence | Literal["practice"]
+    """Certainty that the step belongs here; `practice` is general practice, from no document."""
+
+
+class MemoryOrder(Table, frozen=True, kw_only=True):
+    """A word that saves settings or restores factory settings."""
+
+    parameter: str
+    raw: RawWord
+    """The value, or the bits that are set while the others are kept."""
+    bit: bool = False
+    """True if `raw` contains bits and the word's other bits are kept."""
+    does: str
+    """Exact effect, shown for confirmation."""
+    at_rest_mask: RawWord = 0
+    """Bits of the extended status word that must be 0 beforehand."""
+    keeps_value: bool = False
+    """True if the word keeps the written value and does not show completion."""
+    done: When | None = None
+    """Condition that shows completion, if the word itself does not."""
+    groups: str = ""
+    """A word that selects the groups of settings; nothing happens while it is 0."""
+    source: str = ""
+
+
+class MemoryOrders(Table, frozen=True, kw_only=True):
+    """Commands to a drive's memory; unknown ones are omitted."""
+
+    save: MemoryOrder | None = None
+    factory: MemoryOrder | None = None
+    busy_mask: RawWord = 0
+    """Bits of the extended status word that are 1 while the EEPROM is written."""
+
+
+class Setting(Table, frozen=True, kw_only=True):
+    """A parameter and its required raw value."""
+
+    parameter: str
+    value: RawWord
+
+
+class Way(Table, frozen=True, kw_only=True):
+    """Source of the command or the reference, or the selection between two."""
+
+    sources: Annotated[list[str], Meta(min_length=1, max_length=2)]
+    """One source, or two: without the switch and with it."""
+    switch: str = ""
+
+
+class ControlSource(Table, frozen=True, kw_only=True):
+    """A configuration of command source and reference source."""
+
+    id: Identifier
+    name: str
+    command: Way
+    reference: Way
+    settings: list[Setting]
+    """Settings that select it, in write order."""
+    note: str = ""
+    source: str = ""
+
+
+class BlockChoice(Table, frozen=True, kw_only=True):
+    """Raw selector value of an indirect block and its parameter."""
+
+    raw: RawWord
+    parameter: str
+
+
+class Block(Table, frozen=True, kw_only=True):
+    """An indirect block or a table of the communication scanner."""
+
+    id: Identifier
+    name: str
+    direction: Literal["read", "write"]
+    address: WordAddress
+    min_words: ReadCount = 1
+    max_words: ReadCount
+    slots: list[str]
+    """Parameters that select the content of each slot, in order."""
+    values: list[str] = []
+    """Parameters that carry the values, if they are separate parameters."""
+    selects_by: Literal["choice", "address"]
+    choices: list[BlockChoice] = []
+    fixed_start: bool = False
+    """True if a read must begin at `address`; otherwise any part can be read."""
+    write_when: Literal["any", "stopped"] = "any"
+    effective: Effective = "at-once"
+    note: str = ""
+    source: str = ""
 
 
 class ProfileData(Table, frozen=True, kw_only=True):
