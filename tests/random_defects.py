@@ -41,8 +41,8 @@ FOLDERS = {"screens": "ui", "keeper": "session"}
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-random-defects.json"
 IN_PROCESSES = {"tui/keeper/": ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py")}
 """By the beginning of a path: tests of code that runs in processes that are not recorded."""
-BY_SOURCE = re.compile(r"\bwith self\._|Thread\(")
-"""Lines on locks and threads, which tests check in the source."""
+BY_SOURCE = re.compile(r"\bwith self\._|Thread\(|\.spawn\(")
+"""Lines on locks, threads and workers, which tests check in the source."""
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/.*)$", re.MULTILINE)
 UNREACHED, EQUAL = "NOT REACHED", "EQUIVALENT"
 
@@ -203,8 +203,9 @@ class Chooser:
         near = [name for name in few_lines if module in _text(name.partition("::")[0])]
         beside = [name for name in few_lines if name.startswith(folder)]
         most = MOST_TESTS[0]
-        ordered = [*_varied(near)[: most // 2], *_varied(beside)[: most // 4], *_varied(few_lines)]
-        left = list(dict.fromkeys(ordered))
+        first = [*_varied(near)[: most // 2], *_varied(beside)[: most // 4], *_varied(few_lines)]
+        first = list(dict.fromkeys(first))[:most]
+        left = list(dict.fromkeys((*first, *self._different(few_lines, path), *_spread(few_lines))))
         parts = []
         for number, seconds in zip(MOST_TESTS, MOST_SECONDS, strict=True):
             part: list[str] = []
@@ -216,6 +217,29 @@ class Chooser:
             left = [name for name in left if name not in part]
             parts.append(part)
         return parts
+
+    def _different(self, names: Sequence[str], path: str) -> Iterator[str]:
+        """Tests that together reach each line of the module that any of these tests reaches."""
+        lines: dict[str, set[int]] = {name: set() for name in names}
+        for line, tests in self._record.lines(path).items():
+            for name in tests & lines.keys():
+                lines[name].add(line)
+        left = set().union(*lines.values())
+        while left:
+            best = max(lines, key=lambda name: len(lines[name] & left))
+            left -= lines[best]
+            yield best
+
+
+def _spread(names: Iterable[str]) -> list[str]:
+    """Tests in the same order, but one of each file, then a second one of each, and so on."""
+    count: Counter[str] = Counter()
+    turns: list[tuple[int, str]] = []
+    for name in names:
+        file = name.partition("::")[0]
+        turns.append((count[file], name))
+        count[file] += 1
+    return [name for _, name in sorted(turns, key=lambda turn: turn[0])]
 
 
 def _varied(names: Iterable[str]) -> list[str]:

@@ -150,6 +150,22 @@ def test_no_thread_keeps_its_program_from_ending() -> None:
     assert keeping == {"cli/shared/signals.py", "terminal/last_words.py"}
 
 
+def _name_of(call: ast.Call) -> ast.expr | None:
+    """The name that a call gives a thread, a worker or a task."""
+    named = [word.value for word in call.keywords if word.arg == "name"]
+    return named[0] if named else call.args[1] if len(call.args) > 1 else None
+
+
+@pytest.mark.parametrize("begins", ["Thread", "spawn"])
+def test_each_thread_and_worker_has_a_name_for_the_log(begins: str) -> None:
+    calls = [(path, call) for path, call in calls_of(begins) if path.name != "fake.py"]
+    assert len(calls) > 5
+    for path, call in calls:
+        name = _name_of(call)
+        is_empty = name is None or (isinstance(name, ast.Constant) and not name.value)
+        assert not is_empty, f"{path}:{call.lineno}"
+
+
 BOX = """
 class Box:
     def __init__(self):

@@ -6,6 +6,7 @@ import asyncio
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,21 @@ async def test_line_connects_when_the_port_appears(tmp_path: Path, open_line: Op
     with PtyPeer(honest, link=port):
         await asyncio.to_thread(eventually, lambda: line.state.status is LineStatus.CONNECTED)
         assert (await line.read(1, 5)).words == (5,)
+
+
+def test_a_lost_line_is_retried_soon_then_less_often(tmp_path: Path, open_line: OpenLine) -> None:
+    timing = replace(QUICK, reconnect_first=0.01, reconnect_longest=0.05)
+    line = open_line(str(tmp_path / "port"), timing, wait=None)
+    pauses: list[float] = []
+
+    def hear(event: StateChanged) -> None:
+        if event.state.next_try is not None:
+            pauses.append(event.state.next_try - time.monotonic())
+
+    on_event(line.facts, StateChanged, hear)
+    eventually(lambda: len(pauses) >= 5)
+    assert max(pauses) <= 0.05
+    assert any(pause > 0.02 for pause in pauses), pauses
 
 
 async def test_request_made_while_connecting_is_sent(open_line: OpenLine) -> None:

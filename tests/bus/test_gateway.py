@@ -239,6 +239,7 @@ async def test_requests_delayed_by_a_suspended_loop_are_recognized() -> None:
     await gateway.close()
 
 
+@pytest.mark.internal_errors
 async def test_waiting_client_does_not_block_other_clients() -> None:
     gone: list[str] = []
 

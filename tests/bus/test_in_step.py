@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
+from typing import cast
 
 import pytest
 
@@ -14,7 +15,7 @@ from tui.bus.errors import LineError, LineLost, NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line, LineStatus, Timing
 from tui.bus.link import RtuTcpLink
-from tui.bus.master import ExchangeResult, Piece, ResultKind
+from tui.bus.master import ExchangeResult, Master, Piece, ResultKind, Sending
 from tui.bus.requests import Read, WriteOne
 from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.in_step import InStep
@@ -404,3 +405,25 @@ def test_keep_alive_read_does_not_wait_for_the_drain() -> None:
     read = Read(1, 100, 1)
     assert dispatcher._not_before(Job(read, Priority.FEED, WIDE)) <= 1.0
     assert dispatcher._not_before(Job(read, Priority.POLL, WIDE)) == 5.0
+
+
+class _Answers:
+    """A master whose exchange has one given end."""
+
+    def __init__(self, kind: ResultKind, code: int = 0) -> None:
+        self._result = ExchangeResult(kind, exception=code, sent=1.0)
+
+    async def exchange(self, _sending: Sending) -> ExchangeResult:
+        return self._result
+
+
+@pytest.mark.parametrize(("code", "answered"), [(2, True), (10, False), (11, False)])
+async def test_gateways_report_of_a_silent_drive_is_no_reply_of_the_drive(
+    code: int, answered: bool
+) -> None:
+    line = _Line(gateway=True)
+    job = Job(Read(1, 100, 1), Priority.POLL, NO_ECHO)
+    master = cast(Master, _Answers(ResultKind.EXCEPTION, code))
+    result = await line.steps.prove(master, job, Read(1, 100, 2))
+    assert result.kind is (ResultKind.EXCEPTION if answered else ResultKind.NOTHING)
+    assert line.devices[1].ever_answered is answered

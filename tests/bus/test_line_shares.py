@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import Counter
+from collections.abc import Callable
 
 import pytest
 
-from tui.bus.api import Priority
-from tui.bus.errors import LineLost
+from tui.bus.api import Priority, Reply
+from tui.bus.errors import LineLost, RequestRefused
 from tui.bus.line import Timing
 from tui.bus.master import ExchangeResult, ResultKind, Sending
 from tui.bus.requests import Read, WriteOne
@@ -38,6 +40,8 @@ class TimedLine:
         """Devices that answer nothing."""
         self.round_trip = False
         """Whether programs ask again during the next exchange only."""
+        self.last_moment: Callable[[], None] = lambda: None
+        """Called when a request is about to be sent."""
         self._later: list[Submitted] = []
         self._again: list[Submitted] = []
         self._waiting: list[Job] = []
@@ -70,6 +74,7 @@ class TimedLine:
 
     async def exchange(self, sending: Sending) -> ExchangeResult:
         """Answer, and ask again for what was asked."""
+        self.last_moment()
         sending.look()
         self.now += EXCHANGE
         later, self._later = self._later, []
@@ -244,3 +249,56 @@ def test_idle_program_gains_no_credit() -> None:
     line.serve(3.0)
     counted = Counter(job.program for job in line.sent)
     assert counted["here"] == pytest.approx(counted["away"], rel=0.05)
+
+
+async def outcome(line: TimedLine, job: Job) -> Reply:
+    """Serve until a request is over, and return its reply; raises its error."""
+    line.end = math.inf
+    serving = asyncio.ensure_future(line.dispatcher.serve(line))  # type: ignore[arg-type]
+    try:
+        return await asyncio.wait_for(asyncio.wrap_future(job.answer), 20.0)
+    finally:
+        serving.cancel()
+
+
+async def test_stop_in_the_silence_before_a_command_refuses_it() -> None:
+    line = TimedLine()
+    line.last_moment = lambda: line.dispatcher.facts.give_stop([1], "the stop key")
+    with pytest.raises(RequestRefused, match="a stop came after it"):
+        await outcome(line, line.ask(Priority.OPERATOR_WRITE, word=7))
+    assert line.sent == []
+
+
+@pytest.mark.parametrize(
+    ("priority", "device", "word"),
+    [
+        (Priority.STOP, 1, 0),
+        (Priority.STOP, 1, None),
+        (Priority.POLL, 1, None),
+        (Priority.OPERATOR_WRITE, 2, 7),
+    ],
+)
+async def test_stop_in_the_silence_before_a_request_leaves_stops_reads_and_other_devices(
+    priority: Priority, device: int, word: int | None
+) -> None:
+    line = TimedLine()
+    line.last_moment = lambda: line.dispatcher.facts.give_stop([1], "the stop key")
+    job = line.ask(priority, device=device, word=word)
+    await outcome(line, job)
+    assert line.sent == [job]
+
+
+async def test_command_that_is_held_back_at_the_last_moment_is_sent_later() -> None:
+    """A program that was suspended first hears of the stops of the others."""
+    line = TimedLine()
+    until = line.now + 0.1
+
+    def held() -> bool:
+        line.now += 0.01
+        return line.now < until
+
+    line.last_moment = lambda: setattr(line.dispatcher, "held_back", held)
+    command = line.ask(Priority.OPERATOR_WRITE, word=7)
+    await outcome(line, command)
+    assert line.sent == [command]
+    assert line.now >= until

@@ -8,6 +8,9 @@ import pytest
 
 from tui.bus.api import Priority
 from tui.bus.errors import RequestRefused
+from tui.bus.line_events import DevicesStopped, NoticeReceived
+from tui.bus.program import Program
+from tui.bus.shared_state import SharedState
 
 from .conftest import OpenLine, Share
 from .peer import PtyPeer, eventually, honest
@@ -43,3 +46,12 @@ async def test_stop_ends_the_pause_of_polling(share: Share, stopper: str) -> Non
         await asyncio.to_thread(
             eventually, lambda: all({*program.facts.paused} == {2} for program in programs.values())
         )
+
+
+def test_stop_by_another_program_ends_the_pause_of_its_devices_only() -> None:
+    facts = SharedState()
+    for device in (1, 2, 3):
+        facts.pause_polling(device, "It is being proved.")
+    facts.events.emit(NoticeReceived(3, "no stop"))
+    facts.events.emit(DevicesStopped((1, 2), "the stop key", Program("a", "panel", 1)))
+    assert {*facts.paused} == {3}

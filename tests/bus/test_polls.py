@@ -67,7 +67,8 @@ class Subscriber:
         except LineError as error:
             self.error = error
             return
-        assert self.subscription is not None
+        if self.subscription is None:
+            return
         while (turn := await self.subscription.next(PATIENCE)) is not None:
             self.turns.append(turn)
 

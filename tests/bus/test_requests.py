@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tui.bus.errors import DeviceException
+from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.expectation import exception_code
 from tui.bus.limits import CAUTIOUS, Limits, Window, send_refusal
 from tui.bus.requests import (
@@ -21,6 +21,7 @@ from tui.bus.requests import (
     WriteOne,
     own_words_of,
     words_of,
+    write_request,
 )
 from tui.wire.frames import frame
 
@@ -236,3 +237,32 @@ def test_refusal_ends_with_one_period() -> None:
     refusal = DeviceException(1, 6, 64001, 3, "Value not allowed: it is out of range.")
     assert str(refusal).endswith("out of range.")
     assert not str(refusal).endswith("..")
+
+
+@pytest.mark.parametrize(
+    ("count", "multiple", "functions", "sent_by"),
+    [
+        (1, None, {3, 6, 16}, 6),
+        (1, None, {3, 6}, 6),
+        (1, None, {3, 16}, 16),
+        (1, None, {3}, 6),
+        (2, None, {3, 6, 16}, 16),
+        (2, None, {3, 6}, 16),
+        (1, True, {3, 6}, 16),
+        (1, False, {3, 16}, 6),
+        (2, True, {3, 6}, 16),
+    ],
+)
+def test_write_uses_a_function_of_the_device(
+    count: int, multiple: bool | None, functions: set[int], sent_by: int
+) -> None:
+    request = write_request(4, 100, range(1, count + 1), multiple, frozenset(functions))
+    values = b"".join(value.to_bytes(2) for value in range(1, count + 1))
+    head = bytes([sent_by, 0, 100]) + bytes([0, count, 2 * count] if sent_by == 16 else [])
+    assert (request.device, request.pdu()) == (4, head + values)
+
+
+@pytest.mark.parametrize("count", [0, 2, 3])
+def test_function_6_carries_one_word_only(count: int) -> None:
+    with pytest.raises(RequestRefused, match=f"one word, not {count}"):
+        write_request(1, 100, [5] * count, False, frozenset({3, 6, 16}))

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.bus.master import Piece, ResultKind
+from tui.bus.master import ExchangeResult, Piece, ResultKind
 from tui.bus.requests import Identify, Read, Request, WriteOne
-from tui.bus.rtu.exchange import RtuExchange, find_reply, pieces
+from tui.bus.rtu.exchange import RtuExchange, find_reply, noted, pieces
 from tui.wire.frames import frame, is_whole
 
 from .peer import honest_pdu
@@ -195,3 +195,40 @@ def test_whole_frames_around_a_reply_are_strays_but_noise_is_not() -> None:
     alone = exchange_of(READ).feed(REPLY)
     assert alone is not None
     assert (alone.strays, alone.resynchronised) == ([], False)
+
+
+SENT = frame(1, READ.pdu())
+RIGHT = honest_pdu(READ.pdu())
+REFUSED = bytes([0x83, 2])
+
+
+@pytest.mark.parametrize(
+    ("kind", "pdu", "received", "remarks"),
+    [
+        (ResultKind.NOTHING, b"", [], []),
+        (ResultKind.REPLY, RIGHT, [REPLY], [""]),
+        (ResultKind.EXCEPTION, REFUSED, [frame(1, REFUSED)], [""]),
+        (ResultKind.REPLY, RIGHT, [SENT, REPLY], ["echo", ""]),
+        (ResultKind.REPLY, RIGHT, [b"\x33", OTHER, REPLY], ["noise", "of device 7", ""]),
+        (ResultKind.REPLY, RIGHT, [REPLY, b"\x33"], ["", "noise"]),
+        (ResultKind.REPLY, RIGHT, [frame(1, REFUSED), REPLY], ["not the reply", ""]),
+        (ResultKind.UNSURE, b"", [SENT], ["echo or answer"]),
+        (ResultKind.NOTHING, b"", [SENT], ["echo"]),
+        (ResultKind.NOTHING, b"", [b"\x55"], ["noise"]),
+        (ResultKind.DAMAGED, b"", [REPLY[:4]], ["damaged"]),
+        (ResultKind.WRONG, b"", [frame(1, REFUSED)], ["not the reply"]),
+    ],
+)
+def test_each_received_piece_has_its_remark_in_the_trace(
+    kind: ResultKind, pdu: bytes, received: list[bytes], remarks: list[str]
+) -> None:
+    result = ExchangeResult(kind, pdu=pdu, received=b"".join(received))
+    assert list(noted(result, SENT, 1)) == list(zip(received, remarks, strict=True))
+
+
+def test_reply_that_is_like_its_request_has_no_remark_of_an_echo() -> None:
+    """The reply to a write repeats it; the adapter's echo before it is remarked."""
+    write = WriteOne(1, 5, 7)
+    data = frame(1, write.pdu())
+    result = ExchangeResult(ResultKind.REPLY, pdu=write.pdu(), received=data + data)
+    assert [note for _, note in noted(result, data, 1)] == ["", ""]

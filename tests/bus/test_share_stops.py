@@ -91,6 +91,32 @@ async def test_stop_discards_pending_work_for_its_drive_only(
             await program.write(1, 1, [RUN])
 
 
+async def test_a_stop_is_counted_by_all_programs_before_their_listeners_hear_of_it(
+    share: Share,
+) -> None:
+    """A command that a listener hands over then has been typed after the stop."""
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        programs = [lines.open(name) for name in ("panel", "remote", "run")]
+        heard: dict[str, tuple[int, str]] = {}
+        for line in programs:
+
+            def hear(event: DevicesStopped, line: Line = line) -> None:
+                stops = line.facts.stops
+                heard[line.facts.me.name] = stops.stamp(event.devices[0]), stops.by[2]
+
+            on_event(line.facts, DevicesStopped, hear)
+        for number, line in enumerate(programs, 1):
+            heard.clear()
+            line.facts.give_stop([2], "the stop key")
+            await asyncio.to_thread(eventually, lambda: len(heard) == 2)
+            me = line.facts.me
+            expected = (number, f"the stop key, {me.text}")
+            assert heard == {
+                other.facts.me.name: expected for other in programs if other is not line
+            }
+
+
 async def test_each_program_reports_a_stop_once_with_its_source(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)

@@ -136,6 +136,7 @@ def test_worker_runs_while_the_loop_of_the_caller_hangs(open_line: OpenLine) -> 
         assert worker.error is None
 
 
+@pytest.mark.internal_errors
 def test_error_in_the_worker_is_reported(
     open_line: OpenLine, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -163,6 +164,7 @@ def test_worker_may_close_its_own_line(open_line: OpenLine) -> None:
         eventually(lambda: line.state.status is LineStatus.CLOSED)
 
 
+@pytest.mark.internal_errors
 def test_error_in_a_listener_does_no_harm(
     open_line: OpenLine, caplog: pytest.LogCaptureFixture
 ) -> None:

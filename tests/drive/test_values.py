@@ -225,6 +225,15 @@ def test_a_number_with_a_special_name_is_still_a_number() -> None:
     assert encode(p, "off", {0: "Off"}, Decimal(1)).raw == 0
 
 
+@pytest.mark.parametrize("names", [1, 3, 8])
+def test_names_of_a_quarter_of_the_range_are_an_enumeration_of_less_a_number(names: int) -> None:
+    values = {str(number): f"name {number}" for number in range(names)}
+    for low in (-2, 0, 5):
+        last = low + 4 * names - 1
+        assert is_enumeration(parameter(type="int16", values=values, min=low, max=last))
+        assert not is_enumeration(parameter(type="int16", values=values, min=low, max=last + 1))
+
+
 def test_reserved_bits_must_be_zero() -> None:
     p = parameter(bits=[{"bit": 0, "name": "run"}], reserved=[3])
     assert encode(p, "16#0001", {}, Decimal(1)).raw == 1

@@ -161,7 +161,9 @@ class Fleet:
         self.line_watch.keep(session, console.monitor)
         console.monitor.listen(partial(self._note_fault, session.device))
         # reads files: in a thread that nobody waits for
-        threading.Thread(target=self._recall, args=(console,), daemon=True).start()
+        threading.Thread(
+            target=self._recall, args=(console,), name="last start", daemon=True
+        ).start()
         return console
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:

@@ -225,7 +225,9 @@ class Scanning(LineView):
         if known is not None:
             reported = (identity, identity.device, "" if guessed else console.session.profile.id)
             # reads files: in a thread that nobody waits for
-            threading.Thread(target=known.note, args=reported, daemon=True).start()
+            threading.Thread(
+                target=known.note, args=reported, name="known line", daemon=True
+            ).start()
 
     @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:
