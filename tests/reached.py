@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shutil
 import sqlite3
 import subprocess
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parent.parent
 PARTS = "DRIVEPANEL_REACHED_PARTS"
 """The environment variable that names the folder for what each process has recorded."""
+_TEST = re.compile(r"(?:async )?def (test_\w+)\(")
 PYTEST = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.reached", "--timeout", "400")
 
 
@@ -162,7 +164,7 @@ class Record:
     def tests(self) -> dict[str, Reach]:
         """Each test that was recorded, by its name; what was recorded last counts."""
         return {
-            name: Reach(*reach)
+            renamed(commit, name): Reach(*reach)
             for commit in reversed(self.commits)
             for name, reach in _load(folder() / f"{commit}.json").items()
         }
@@ -173,16 +175,52 @@ class Record:
             found = self._lines[path] = defaultdict(set)
             for commit in self.commits:
                 for line, tests in _lines_at(commit, path).items():
-                    found[line] |= tests
+                    found[line] |= {renamed(commit, name) for name in tests}
         return self._lines[path]
 
 
 @cache
 def _moved(commit: str) -> dict[str, str]:
     """Where files were at a commit that have another path today."""
-    status = git("diff", "--name-status", "--diff-filter=R", "-M50%", commit, "--", "tui")
+    status = git("diff", "--name-status", "--diff-filter=R", "-M50%", commit, "--", "tui", "tests")
     rows = (line.split("\t") for line in status.splitlines())
     return {new: old for _, old, new in rows}
+
+
+@cache
+def renamed(commit: str, name: str) -> str:
+    """The present name of a test of a commit, its parameters included."""
+    file, _, rest = name.partition("::")
+    function, bracket, parameters = rest.partition("[")
+    now, names = _renamed_in(commit, file)
+    return f"{now}::{names.get(function, function)}{bracket}{parameters}"
+
+
+@cache
+def _renamed_in(commit: str, file: str) -> tuple[str, dict[str, str]]:
+    """Where a file of tests of a commit is today, and tests of it that have another name."""
+    now = next((new for new, old in _moved(commit).items() if old == file), file)
+    if not (ROOT / now).exists():
+        return now, {}
+    try:
+        before = git("show", f"{commit}:{file}").splitlines()
+    except subprocess.CalledProcessError:
+        return now, {}
+    return now, new_names(before, (ROOT / now).read_text("utf-8").splitlines())
+
+
+def new_names(before: list[str], after: list[str]) -> dict[str, str]:
+    """By the former name of each test of a file that was renamed: its present name."""
+    old, new = (
+        {number: found[1] for number, line in enumerate(lines, 1) if (found := _TEST.match(line))}
+        for lines in (before, after)
+    )
+    kept = set(new.values())
+    return {
+        old[was]: new[line]
+        for line, was in same_lines(before, after)
+        if line in new and was in old and old[was] not in kept
+    }
 
 
 @cache

@@ -12,7 +12,7 @@ from tests.defects.equivalent import EQUIVALENT
 from tests.mutants import DEFECTS, ROOT, STALE, SURVIVED, Stale, judge, place_of, planted
 from tests.mutator import KINDS, Defaults, Mutant, Mutator
 from tests.random_defects import EQUAL, UNREACHED, Judged, Uses, all_sites, rate, report, sample
-from tests.reached import same_lines
+from tests.reached import new_names, same_lines
 from tests.sources import PACKAGE, modules
 
 WHOLE = "def half(x):\n    return x / 2\n"
@@ -195,6 +195,15 @@ def test_lines_of_a_record_follow_the_source() -> None:
     before, after = ["a", "b", "c"], ["new", "a", "B", "c"]
     assert same_lines(before, after) == [(2, 1), (3, 2), (4, 3)]
     assert same_lines(["a", "b"], ["b"]) == [(1, 2)]
+
+
+def test_a_test_that_was_renamed_is_found_by_its_body() -> None:
+    before = ["def test_a() -> None:", "    a", "def test_b() -> None:", "    b"]
+    new = ["def test_new() -> None:", "    new"]
+    assert new_names(before, [*new, "async def test_c() -> None:", *before[1:]]) == {
+        "test_a": "test_c"
+    }
+    assert new_names(before, [*new, *before]) == {}
 
 
 def test_constant_is_tried_by_the_functions_that_use_it() -> None:

@@ -85,14 +85,14 @@ def test_swapped_word_has_the_bytes_of_the_word_in_the_other_order(word: int) ->
 
 def test_settings_of_the_line_are_read_first_then_usual_ones_and_few() -> None:
     roles = ("address", "baud", "parity", "timeout")
-    of_line = [parameter(f"L{n}", n, **LIMITS) for n in range(len(roles))]
+    own = [parameter(f"L{n}", n, **LIMITS) for n in range(len(roles))]
     usual = [
         parameter("RATED", 22, quantity="rated_frequency", **LIMITS),
         parameter("HIGH", 21, quantity="high_speed", **LIMITS),
     ]
     settings = [{"role": role, "parameter": f"L{n}"} for n, role in enumerate(roles)]
     link = {"baud": 19200, "format": "8E1", "settings": settings}
-    codes = telling_codes(profile_of(*usual, *of_line, link=link))
+    codes = telling_codes(profile_of(*usual, *own, link=link))
     assert codes == ("L0", "L1", "L2", "L3", "HIGH")
     assert len(codes) == ENOUGH
     assert telling_codes(profile_of(*usual)) == ("HIGH", "RATED")
