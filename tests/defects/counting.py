@@ -47,7 +47,7 @@ DEFECTS = (
         'AUTO_FOCUS: ClassVar = ""',
         'AUTO_FOCUS: ClassVar = "#typed"',
         "Space on Frames goes into a hidden field, and stops no motor.",
-        ("tests/ui/test_frames_screen.py::test_nothing_takes_the_focus_so_that_space_stops",),
+        ("tests/ui/test_frames_screen.py::test_nothing_has_the_focus_so_that_space_stops",),
     ),
     Defect(
         "unanswered-is-no-error",

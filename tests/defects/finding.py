@@ -146,7 +146,7 @@ DEFECTS = (
         "self._strangers.keep(identity.device)",
         "pass",
         "A drive of an unknown family trips while a person looks up its family.",
-        (f"{SETTINGS}::test_drives_are_still_polled_while_the_person_decides_known_or_not",),
+        (f"{SETTINGS}::test_drives_are_still_polled_during_the_question",),
     ),
     Defect(
         "unclear-answer-passed-by",
@@ -154,7 +154,7 @@ DEFECTS = (
         "if self.found or self.search.answered:",
         "if self.found:",
         "Two drives at one address get one request and are then not polled, without a question.",
-        (f"{SETTINGS}::test_unexpected_answer_tries_no_other_setting_unasked",),
+        (f"{SETTINGS}::test_unexpected_reply_tries_other_settings_only_if_confirmed",),
     ),
     Defect(
         "families-not-named",
@@ -194,6 +194,6 @@ DEFECTS = (
         "if not self.found and self.search is not None and self.search.answered:",
         "if False:",
         '"No answer" is shown although two drives answer at once.',
-        (f"{SETTINGS}::test_unexpected_answer_tries_no_other_setting_unasked",),
+        (f"{SETTINGS}::test_unexpected_reply_tries_other_settings_only_if_confirmed",),
     ),
 )  # fmt: skip

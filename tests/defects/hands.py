@@ -56,7 +56,7 @@ DEFECTS = (
         "                *not_stopped_lines(view.not_stopped, width),\n",
         "",
         "The commander of a motor that did not stop is truncated or covered.",
-        ("tests/ui/test_stop_keys.py::test_nothing_covers_that_a_motor_is_not_stopped",),
+        ("tests/ui/test_stop_keys.py::test_not_stopped_message_is_never_covered",),
     ),
     Defect(
         "broken-key-reader-stops-nothing",
@@ -72,10 +72,7 @@ DEFECTS = (
         "                fleet.last_stop(error, chosen)\n",
         "                pass\n",
         "An error in the panel disables the stop key.",
-        (
-            "tests/ui/test_stop_keys.py"
-            "::test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive",
-        ),
+        ("tests/ui/test_stop_keys.py::test_error_after_a_stop_key_does_not_prevent_its_frame",),
     ),
     Defect(
         "counters-reset-unarmed",
@@ -108,7 +105,7 @@ DEFECTS = (
         "if True:",
         "Keys typed while the demo opens open a real line of an earlier day instead.",
         (
-            f"{OPENING}::test_keys_of_the_tour_typed_too_early_open_no_line_and_work_later",
+            f"{OPENING}::test_tour_keys_typed_too_early_open_no_line_and_work_later",
             f"{OPENING}::test_stops_work_while_a_second_line_opens",
         ),
     ),
@@ -118,7 +115,7 @@ DEFECTS = (
         "if stroke is None or stroke.read_at > self.opening.ended:",
         "if True:",
         "A key that a slow panel handles late opens a drive or another line.",
-        (f"{OPENING}::test_a_key_read_while_a_line_opens_is_ignored_though_it_is_handled_later",),
+        (f"{OPENING}::test_key_read_while_a_line_opens_is_ignored_even_if_handled_later",),
     ),
     Defect(
         "search-left-without-a-question",
@@ -126,7 +123,7 @@ DEFECTS = (
         "asks = here is not None or self.scanning",
         "asks = here is not None",
         "Enter on another line closes the line being searched, without a question.",
-        (f"{OPENING}::test_enter_on_another_line_asks_while_the_search_goes_on",),
+        (f"{OPENING}::test_enter_on_another_line_asks_during_the_scan",),
     ),
     Defect(
         "named-like-a-key",

@@ -118,7 +118,7 @@ DEFECTS = (
         "if acting := watch.left_alone():",
         "if (acting := watch.left_alone()) and False:",
         "A drive trips because a person listened to the line.",
-        (f"{HEARING}::test_a_drive_that_the_panel_feeds_is_not_left_alone",),
+        (f"{HEARING}::test_drive_kept_alive_by_the_panel_blocks_monitoring",),
     ),
     Defect(
         "running-motor-left-for-listening",
@@ -126,7 +126,7 @@ DEFECTS = (
         "if running := watch.under_command():",
         "if (running := watch.under_command()) and False:",
         "A motor started by the panel runs on, and the panel no longer polls or stops it.",
-        (f"{HEARING}::test_why_the_panel_may_not_fall_silent",),
+        (f"{HEARING}::test_reasons_that_block_monitoring_are_named",),
     ),
     Defect(
         "listening-says-it-stops",
@@ -134,7 +134,7 @@ DEFECTS = (
         "if self.hearing and not self.fleets:",
         "if False:",
         "A person relies on a stop key that stops nothing.",
-        (f"{HEARING}::test_a_line_that_is_not_open_is_listened_to_and_given_back",),
+        (f"{HEARING}::test_closed_line_is_monitored_and_released",),
     ),
     Defect(
         "left-for-listening-unasked",
@@ -142,6 +142,6 @@ DEFECTS = (
         "if here.fleet.found else",
         "if False else",
         "One key ends the panel's polling of its drives.",
-        (f"{HEARING}::test_drives_that_do_not_act_are_left_to_their_master_with_a_yes",),
+        (f"{HEARING}::test_monitoring_pauses_polling_after_confirmation",),
     ),
 )

@@ -74,7 +74,7 @@ async def write(made: Bench) -> None:
     await made.pilot.press("y")
 
 
-async def test_pick_move_write_and_verify() -> None:
+async def test_slots_are_picked_moved_written_and_verified() -> None:
     async with bench("atv71") as made:
         await to_blocks(made)
         await made.pilot.press("down", "down")
@@ -108,7 +108,7 @@ async def test_pick_move_write_and_verify() -> None:
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
 
 
-async def test_nothing_is_written_while_the_motor_turns_and_stop_works_here() -> None:
+async def test_running_motor_blocks_writing_and_stop_works() -> None:
     async with bench("atv71") as made:
         await made.running()
         await to_blocks(made)
@@ -124,7 +124,7 @@ async def test_nothing_is_written_while_the_motor_turns_and_stop_works_here() ->
         await made.stopped()
 
 
-async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
+async def test_change_by_another_source_is_detected_and_not_overwritten() -> None:
     async with bench("atv71") as made:
         await to_blocks(made)
         await arm(made.pilot)
@@ -142,7 +142,9 @@ async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
         await message(made, "Wrote NMA1, NMA3, all verified")
 
 
-async def test_save_and_load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_assignment_is_saved_and_loaded(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.chdir(tmp_path)
     async with bench("atv71") as made:
         await to_blocks(made)
@@ -159,7 +161,7 @@ async def test_save_and_load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
         await message(made, "scanner.toml:", "NMA3")
 
 
-async def test_outputs_are_written_when_armed_only() -> None:
+async def test_outputs_are_written_only_if_armed() -> None:
     async with bench("atv71") as made:
         await to_blocks(made)
         for slot, code in {"NCA1": "ACC", "NCA2": "DEC"}.items():
@@ -190,7 +192,7 @@ async def test_user_words_are_kept_for_the_drive() -> None:
         await until(made.pilot, lambda: "not a format" in str(fault.render()))
 
 
-async def test_an_indirect_block_waits_for_a_reset() -> None:
+async def test_indirect_block_waits_for_a_reset() -> None:
     async with bench("atv21") as made:
         await to_blocks(made, "F875")
         await until(made.pilot, lambda: "unused" in shown(made.app, "first"))
@@ -207,7 +209,7 @@ async def test_an_indirect_block_waits_for_a_reset() -> None:
         await until(made.pilot, lambda: "F875 FD01" in shown(made.app, "first"))
 
 
-async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word() -> None:
+async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_confirmation() -> None:
     async with bench("atv21") as made:
         await to_blocks(made, "F875")
         await made.pilot.press("tab", "a")
@@ -238,7 +240,7 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
 
 
 @pytest.mark.parametrize("family", ["atv312", "powerdrive"])
-async def test_a_family_without_blocks(family: str) -> None:
+async def test_family_without_blocks_says_so_and_ignores_keys(family: str) -> None:
     async with bench(family) as made:
         await to_blocks(made, "neither")
         keys = ("enter", "tab", "delete", "plus", "minus", "w", "V", "X", "u", "ctrl+o", "ctrl+s")
@@ -250,7 +252,7 @@ async def test_a_family_without_blocks(family: str) -> None:
 
 
 @pytest.mark.sweep
-async def test_every_screen_of_a_drive_is_one_key_away_from_every_other() -> None:
+async def test_every_drive_screen_is_one_key_from_every_other() -> None:
     async with bench("atv71") as made:
         places = {
             "1": ConnectionScreen,
@@ -271,7 +273,7 @@ async def test_every_screen_of_a_drive_is_one_key_away_from_every_other() -> Non
             assert len(made.app.screen_stack) <= 4
 
 
-async def test_p_names_the_keys_that_write_the_proposal_in_this_state(
+async def test_p_names_the_keys_that_write_the_suggestion(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def best(proposals: Proposals) -> Saving:

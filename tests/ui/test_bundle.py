@@ -108,7 +108,7 @@ async def test_esc_cancels_and_leaves_no_file(tmp_path: Path) -> None:
     assert [text for text in os.listdir(tmp_path) if "a.zip" in text] == []
 
 
-async def test_no_line_no_bundle() -> None:
+async def test_bundle_without_a_line_is_refused() -> None:
     app = DrivePanelApp(open_line=open_line, drive_documents=drive_documents)
     async with app.run_test(size=(80, 24)) as pilot:
         app.connection.lines.clear_options()

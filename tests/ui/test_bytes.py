@@ -135,7 +135,7 @@ PIECES = st.lists(
 
 
 @pytest.mark.parametrize("seed", range(3))
-async def test_the_terminal_shows_what_the_screen_holds(seed: int) -> None:
+async def test_terminal_shows_the_content_of_the_screen(seed: int) -> None:
     """However the lines change, cell by cell and in color."""
     import random
 
@@ -170,7 +170,7 @@ class Dialog(ModalScreen[None]):
         yield Label("wide 漢字 é e\u0301")
 
 
-async def test_dialogs_and_other_sizes_leave_no_trace() -> None:
+async def test_dialogs_and_resizes_leave_no_remains() -> None:
     import random
 
     chance = random.Random(7)
@@ -215,9 +215,7 @@ def _line(chance: Any) -> Text:
 
 
 @given(PIECES, PIECES)
-def test_runs_are_where_two_lines_differ_and_no_more_than_a_move_beyond(
-    item: Text, other: Text
-) -> None:
+def test_runs_cover_differences_with_little_excess(item: Text, other: Text) -> None:
     before, after = (strip_of(text) for text in (item, other))
     found = runs(before, after)
     old, new = (list(zip(*looks(strip), strict=True)) for strip in (before, after))
@@ -242,7 +240,7 @@ def _console() -> Any:
     return Console()
 
 
-async def test_showing_the_same_again_sends_nothing_and_a_digit_few_bytes() -> None:
+async def test_unchanged_screen_sends_nothing_and_one_digit_few_bytes() -> None:
     app = Seen()
     async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
         left = app.query_one("#left", Lines)
@@ -266,7 +264,7 @@ def test_monitor_sends_a_small_part_of_what_stock_widgets_send() -> None:
 
 
 @given(st.lists(st.tuples(st.integers(0, ROWS - 1), PIECES, st.integers(0, 200)), max_size=20))
-def test_pieces_of_frames_come_to_the_same_picture(
+def test_partial_frames_add_up_to_the_same_screen(
     steps: list[tuple[int, Text, int]],
 ) -> None:
     """However little a frame may have, and whatever changes before the rest of it is sent."""
@@ -282,7 +280,7 @@ def test_pieces_of_frames_come_to_the_same_picture(
         assert terminal.text()[y].rstrip("?") == strip.text
 
 
-def test_a_frame_begins_with_the_strip_and_the_message() -> None:
+def test_frame_begins_with_the_status_bar_and_the_message() -> None:
     picture = Picture()
     rows = [(0, y, Strip([Segment(f"row{y}")])) for y in range(24)]
     picture.want(rows, ColorSystem.TRUECOLOR)
@@ -339,7 +337,7 @@ async def test_unread_output_is_dropped_for_the_newest() -> None:
         assert app.answer() == ""
 
 
-async def test_output_of_a_key_is_sent_at_once() -> None:
+async def test_output_of_a_key_is_sent_immediately() -> None:
     app = Paced()
     async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
         await pilot.pause()

@@ -205,7 +205,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-async def test_no_message_says_that_an_armed_drive_is_not() -> None:
+async def test_armed_drive_is_never_reported_as_disarmed() -> None:
     async with bench("atv71") as made:
         await made.pilot.press("r")
         await made.message("Not armed. Press a to arm this drive.")
@@ -214,7 +214,7 @@ async def test_no_message_says_that_an_armed_drive_is_not() -> None:
         assert "Not armed" not in shown(made.app, "said")
 
 
-async def test_a_motor_that_stands_after_a_quick_stop_is_not_reported_as_stopping() -> None:
+async def test_motor_at_standstill_after_a_quick_stop_is_not_stopping() -> None:
     """An Altivar 71 keeps the state of its quick stop at rest."""
     async with bench("atv71") as made:
         await made.running()
@@ -228,7 +228,7 @@ async def test_a_motor_that_stands_after_a_quick_stop_is_not_reported_as_stoppin
 
 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "powerdrive"))
-async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
+async def test_drive_is_armed_run_reversed_stopped_tripped_and_reset(family: str) -> None:
     async with bench(family) as made:
         await made.running()
         await until(made.pilot, lambda: runs(made.app))
@@ -297,9 +297,7 @@ async def test_reset_without_a_fault_says_so() -> None:
     ("family", "sets"),
     [("atv31", {"CHCF": 2, "Cd1": 1}), ("powerdrive", {"6.43": 0}), ("atv71", {})],
 )
-async def test_failed_reset_is_whole_on_faults_and_messages_at_80x24(
-    family: str, sets: dict[str, int]
-) -> None:
+async def test_failed_reset_text_is_not_cut_at_80x24(family: str, sets: dict[str, int]) -> None:
     async with bench(family, sets=sets) as made:
         faults = made.drive().profile.data.faults.codes
         made.drive().provoke(next((f.raw for f in faults if f.raw), 1), persists=True)
@@ -349,13 +347,13 @@ async def test_reset_question_names_channel_and_closed_inputs(
         await made.pilot.press("escape")
 
 
-async def test_a_read_only_line_is_not_armed() -> None:
+async def test_read_only_line_is_not_armed() -> None:
     async with bench("atv71", read_only=True) as made:
         await made.pilot.press("a")
         await made.message("read-only")
 
 
-async def test_reference_by_steps_and_its_limit() -> None:
+async def test_reference_steps_end_at_the_limit() -> None:
     async with bench("atv71") as made:
         await made.armed()
         await made.refer("20")
@@ -368,7 +366,7 @@ async def test_reference_by_steps_and_its_limit() -> None:
         assert made.drive().raw("LFR") == 160
 
 
-async def test_input_typed_ahead_reaches_line_but_commands_nothing(
+async def test_keys_typed_ahead_edit_the_run_line_but_command_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("tui.screens.monitor.run_line.ENTER_COUNTS_AFTER", 60.0)
@@ -440,7 +438,7 @@ async def test_space_stops_outside_texts_only() -> None:
 
 @pytest.mark.parametrize("typed", kept(["", "4x"], "4x"))
 @pytest.mark.parametrize("way", ["3 slash a c c enter enter", "1 tab tab tab"])
-async def test_space_stops_where_a_number_is_typed(way: str, typed: str) -> None:
+async def test_space_stops_while_a_number_is_typed(way: str, typed: str) -> None:
     """A value, an address: no space is ever typed there. A reference: `test_run_line`."""
     async with bench("atv71") as made:
         await made.running()
@@ -454,7 +452,7 @@ async def test_space_stops_where_a_number_is_typed(way: str, typed: str) -> None
         assert field.value == before
 
 
-def test_numbers_references_and_addresses_take_no_space() -> None:
+def test_number_fields_accept_no_space() -> None:
     """Each field says whether a space is a text there; a new one has to be thought of."""
     fields = {
         path.relative_to(SOURCES).as_posix(): {
@@ -491,7 +489,7 @@ async def test_stop_works_in_the_palette() -> None:
         await made.stopped()
 
 
-async def test_one_key_stops_every_drive() -> None:
+async def test_single_key_stops_every_drive() -> None:
     async with bench("atv71", "atv21", "atv312") as made:
         for device in (2, 3):
             made.drive(device).run(30.0)
@@ -515,7 +513,7 @@ async def test_arming_ends_when_another_drive_is_shown() -> None:
 
 
 @pytest.mark.parametrize(("key", "turns"), [("s", False), ("l", True)])
-async def test_leaving_with_a_motor_of_ours(key: str, turns: bool) -> None:
+async def test_leaving_with_a_running_motor_asks_and_stops(key: str, turns: bool) -> None:
     async with bench("atv71") as made:
         await made.running()
         app = made.app
@@ -540,7 +538,7 @@ async def test_leaving_with_a_motor_of_ours(key: str, turns: bool) -> None:
         assert (made.speed() != 0) is turns
 
 
-async def test_back_to_connection_asks_nothing_and_keeps_the_drive_fed() -> None:
+async def test_return_to_line_asks_nothing_and_keeps_the_drive_alive() -> None:
     async with bench("atv71") as made:
         await made.running()
         await made.pilot.press("escape")
@@ -552,7 +550,7 @@ async def test_back_to_connection_asks_nothing_and_keeps_the_drive_fed() -> None
         await made.stopped()
 
 
-async def test_an_error_of_the_panel_stops_its_motor() -> None:
+async def test_internal_error_stops_the_motor() -> None:
     ran = []
 
     async def breaks() -> None:

@@ -17,7 +17,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-async def test_a_drive_is_not_armed_by_a_profile_that_it_contradicts() -> None:
+async def test_drive_with_a_contradicting_profile_is_not_armed() -> None:
     async with panel(DriveSpec("atv71", 1)) as (app, pilot):
         await until(pilot, lambda: app.connection.drives.has_focus)
         field = app.connection.query_one("#profile", Input)

@@ -7,7 +7,7 @@ from tui.screens.control.view import LEFT_ROWS, left_lines
 LEFT = "Runs since 17:34, started by run, process 4711, which has exited; no program commands it."
 
 
-def test_motor_without_a_commander_is_reported_with_the_keys() -> None:
+def test_motor_without_a_commander_is_shown_with_the_keys() -> None:
     lines = [line.plain for line in left_lines(LEFT, 80)]
     text = " ".join(line.strip() for line in lines)
     assert text.startswith(LEFT)
@@ -17,5 +17,5 @@ def test_motor_without_a_commander_is_reported_with_the_keys() -> None:
     assert all(line.startswith("  ") and len(line) <= 80 for line in lines)
 
 
-def test_other_motors_need_no_line() -> None:
+def test_motor_with_a_commander_has_no_extra_line() -> None:
     assert left_lines("", 80) == []

@@ -53,11 +53,11 @@ def test_frames_are_explained(frames: list[tuple[str, str]], output: list[str]) 
     assert reported(*frames) == output
 
 
-def test_a_reply_of_another_drive_is_not_reported_by_the_last_request() -> None:
+def test_reply_of_another_drive_is_not_decoded_by_the_last_request() -> None:
     assert reported((">", "02 03 0C81 0001"), ("<", "03 03 02 0637"))[1] == "3 1 words"
 
 
-def test_modbus_tcp_has_its_head_before_the_device() -> None:
+def test_modbus_tcp_header_precedes_the_device() -> None:
     assert reported((">", "0001 0000 0006 02 03 0C81 0001"), tcp=True) == ["2 read ETA"]
 
 
@@ -65,6 +65,6 @@ def test_modbus_tcp_has_its_head_before_the_device() -> None:
     frames=st.lists(st.tuples(st.sampled_from(["out", "in"]), st.binary(max_size=40)), max_size=6),
     tcp=st.booleans(),
 )
-def test_any_bytes_are_reported_or_left_alone(frames: list[tuple[str, bytes]], tcp: bool) -> None:
+def test_random_bytes_are_decoded_or_omitted(frames: list[tuple[str, bytes]], tcp: bool) -> None:
     made = [Frame(0.0, "out" if way == "out" else "in", data) for way, data in frames]
     assert len(decoded(made, lambda _: ATV71, no_raws, tcp=tcp)) == len(made)

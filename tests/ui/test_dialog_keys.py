@@ -130,7 +130,7 @@ def dialogs_there_are() -> set[str]:
     }
 
 
-def test_every_dialog_is_looked_at_here() -> None:
+def test_every_dialog_is_tested() -> None:
     assert dialogs_there_are() == {name.partition(" ")[0] for name in DIALOGS}
 
 
@@ -153,7 +153,7 @@ async def on_monitor(app: DrivePanelApp, pilot: Any, monkeypatch: pytest.MonkeyP
 
 
 @SIZES
-async def test_the_stop_key_at_the_bottom_is_the_one_that_stops(
+async def test_stop_key_shown_in_a_dialog_stops(
     size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     app = fakes.app_of(kind=fakes.Easel)
@@ -182,7 +182,7 @@ async def test_the_stop_key_at_the_bottom_is_the_one_that_stops(
 
 
 @pytest.mark.sweep  # every key on every question
-async def test_nothing_but_its_own_keys_moves_a_dialog(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_only_its_own_keys_affect_a_dialog(monkeypatch: pytest.MonkeyPatch) -> None:
     app = fakes.app_of(kind=fakes.Easel)
     async with app.run_test(size=(80, 24)) as pilot:
         console, stopped = await on_monitor(app, pilot, monkeypatch)
@@ -208,7 +208,7 @@ LETTERS = re.compile(r"(?:^|  )([^ ]) ")
 
 
 @pytest.mark.parametrize(("screen", "key"), [("3", "/"), ("7", "O"), ("7", "j"), ("1", "c")])
-async def test_no_letter_is_promised_where_it_is_typed(
+async def test_letters_typed_into_a_field_are_not_shown_as_keys(
     screen: str, key: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     app = fakes.app_of()
@@ -239,7 +239,7 @@ LONG = "\n".join(f"line {number} of what follows" for number in range(60))
 
 
 @EVERY_SIZE
-async def test_the_keys_of_a_dialog_are_in_sight_whatever_is_above_them(
+async def test_keys_of_a_dialog_are_always_visible(
     size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     app = fakes.app_of(kind=fakes.Easel)
@@ -283,9 +283,7 @@ async def test_the_keys_of_a_dialog_are_in_sight_whatever_is_above_them(
         ("a\x00b", "control characters"),
     ],
 )
-async def test_a_name_that_no_file_can_have_is_refused_where_it_is_typed(
-    name: str, why: str
-) -> None:
+async def test_invalid_file_name_is_refused_in_the_dialog(name: str, why: str) -> None:
     app = fakes.app_of(kind=fakes.Easel)
     async with app.run_test(size=(80, 24)) as pilot:
         app.push_screen(Ask("Save to", fault_of_new, text="x"))
@@ -322,14 +320,14 @@ CHECKS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
 
 
 @pytest.mark.parametrize("name", CHECKS)
-def test_typed_or_pasted_nonsense_is_refused_and_ends_nothing(name: str) -> None:
+def test_invalid_input_is_refused_and_ends_nothing(name: str) -> None:
     check, texts = CHECKS[name]
     for text in texts:
         reported = check(text)
         assert reported or text == "f", text[:20]
 
 
-async def test_a_key_that_means_nothing_to_a_dialog_reports_where_it_works(
+async def test_key_without_a_meaning_in_a_dialog_says_where_it_works(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     app = fakes.app_of(kind=fakes.Easel)
@@ -362,7 +360,7 @@ async def test_a_key_that_means_nothing_to_a_dialog_reports_where_it_works(
         assert app.events.newest == newest
 
 
-async def test_s_in_the_results_of_a_write_goes_on_to_saving(
+async def test_s_in_write_results_continues_with_saving(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     app = fakes.app_of(kind=fakes.Easel)

@@ -56,7 +56,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-async def test_an_unforeseen_error_is_one_line_and_the_panel_goes_on() -> None:
+async def test_unforeseen_error_is_one_line_and_the_panel_continues() -> None:
     def broken(*_: Any, **__: Any) -> OpenLine:
         raise RuntimeError("the register of lines is upside down")
 
@@ -68,7 +68,7 @@ async def test_an_unforeseen_error_is_one_line_and_the_panel_goes_on() -> None:
         assert app.screen is app.connection
 
 
-async def test_enter_tries_the_line_again_that_could_not_be_opened(
+async def test_enter_retries_a_line_that_could_not_be_opened(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     tried: list[str] = []
@@ -96,7 +96,7 @@ async def test_enter_tries_the_line_again_that_could_not_be_opened(
     assert set(tried) == {"tcp:elsewhere"}
 
 
-async def test_enter_on_a_port_tries_that_port_again(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_enter_on_a_port_retries_that_port(monkeypatch: pytest.MonkeyPatch) -> None:
     tried: list[str] = []
 
     def busy(text: str, **_: Any) -> OpenLine:
@@ -114,7 +114,7 @@ async def test_enter_on_a_port_tries_that_port_again(monkeypatch: pytest.MonkeyP
     assert set(tried) == {"serial:/dev/ttyUSB0,19200,8E1"}
 
 
-async def test_a_line_that_opens_after_another_was_chosen_is_closed() -> None:
+async def test_line_that_opens_after_another_was_selected_is_closed() -> None:
     opener = Opener()
     app = DrivePanelApp(open_line=opener, start="tcp:slow")
     async with app.run_test(size=(80, 24)) as pilot:
@@ -129,7 +129,7 @@ async def test_a_line_that_opens_after_another_was_chosen_is_closed() -> None:
     assert opener.closed == ["tcp:slow", "tcp:other"]
 
 
-async def test_a_line_that_opens_after_the_panel_was_left_is_closed() -> None:
+async def test_line_that_opens_after_the_panel_exited_is_closed() -> None:
     opener = Opener()
     app = DrivePanelApp(open_line=opener, start="tcp:slow")
     async with app.run_test(size=(80, 24)) as pilot:
@@ -142,7 +142,7 @@ async def test_a_line_that_opens_after_the_panel_was_left_is_closed() -> None:
         await asyncio.sleep(0.05)
 
 
-async def test_an_error_of_the_panel_itself_leaves_one_line_and_no_traceback(
+async def test_internal_error_prints_one_line_without_a_traceback(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     app = DrivePanelApp(open_line=Opener())
@@ -164,7 +164,7 @@ async def test_an_error_of_the_panel_itself_leaves_one_line_and_no_traceback(
 
 
 @pytest.mark.parametrize("size", [(20, 5), (40, 12), (79, 23), (200, 60)])
-async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int, int]) -> None:
+async def test_screens_survive_every_terminal_size(size: tuple[int, int]) -> None:
     from tui.drive.profile import library
     from tui.screens.monitor.screen import MonitorScreen
 
@@ -183,7 +183,7 @@ async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int,
         assert "press 5 for what to do" in str(app.screen.query_one("#state", Lines).lines[5])
 
 
-async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:
+async def test_closing_the_line_of_a_drive_with_a_timeout_asks_first() -> None:
     app = DrivePanelApp(open_line=lambda *_, **__: demo_line({"atv21": 35.0}), start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await until(
@@ -198,7 +198,7 @@ async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:
         await until(pilot, lambda: app.opened is None)
 
 
-async def test_a_panel_that_ends_meets_no_error_without_its_screens() -> None:
+async def test_exiting_panel_without_screens_raises_nothing() -> None:
     """Textual takes the screens away first; a look around or a key just then ended it badly."""
     app = DrivePanelApp(open_line=lambda text, **_: fakes.opened())
     async with app.run_test(size=(80, 24)):

@@ -28,7 +28,7 @@ def reported(shown: DoctorView, width: int = 80, height: int = 20) -> str:
 
 
 @pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "atv71"])
-def test_every_fault_is_reported_without_a_cut_at_80_columns(family: str) -> None:
+def test_every_fault_fits_80_columns(family: str) -> None:
     profile = library.load(family)
     for fault in profile.data.faults.codes:
         help_ = profile.guide.fault(fault.raw)
@@ -51,7 +51,7 @@ def test_fault_without_a_number_is_named_before_its_causes() -> None:
     assert help_.probable[0] in second
 
 
-def test_general_practice_is_reported_to_be_so() -> None:
+def test_general_practice_is_marked() -> None:
     practice = reported(view(1))
     assert "practice" in practice.partition("Probably")[2].splitlines()[0]
     guide = reported(view(18))
@@ -60,7 +60,7 @@ def test_general_practice_is_reported_to_be_so() -> None:
     assert guide.partition("Reset")[2].splitlines()[0].endswith("practice")
 
 
-def test_the_drive_says_whether_a_reset_works() -> None:
+def test_drive_reports_if_a_reset_is_possible() -> None:
     for raw, output in ((0x0004, "x works now"), (0, "Not yet, says the drive")):
         text = reported(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW)))
         assert output in text
@@ -75,7 +75,7 @@ def test_the_drive_says_whether_a_reset_works() -> None:
 
 @pytest.mark.parametrize(("width", "height"), [(60, 16), (60, 12), (80, 20), (80, 12)])
 @pytest.mark.parametrize("raw", [9, 18, 22])
-def test_how_it_ends_is_never_cut_off(raw: int, width: int, height: int) -> None:
+def test_reset_text_is_never_cut_off(raw: int, width: int, height: int) -> None:
     for eti in (None, 0, 4):
         readings = {} if eti is None else readings_of(ATV71, {"ETI": eti}, NOW)
         shown = view(raw, readings=readings)
@@ -86,7 +86,7 @@ def test_how_it_ends_is_never_cut_off(raw: int, width: int, height: int) -> None
         assert len(text.splitlines()) <= height
 
 
-def test_which_input_tripped_it_is_reported_at_80_columns() -> None:
+def test_input_that_caused_the_trip_fits_80_columns() -> None:
     """'Logic input ...' and 16#000C told nobody where to look."""
     external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
@@ -97,7 +97,7 @@ def test_which_input_tripped_it_is_reported_at_80_columns() -> None:
     assert "IL1R   none " in still
 
 
-def test_an_alarm_points_at_something_too() -> None:
+def test_alarm_has_causes_and_parameters() -> None:
     text = reported(view(None, present=False, alarms=[("LRS6", 8, "Undervoltage alarm")]))
     for part in ("UNDERVOLTAGE ALARM", "alarm, no fault", "Mains low or a dip", "ULN", "practice"):
         assert part in text
@@ -107,14 +107,14 @@ def test_an_alarm_points_at_something_too() -> None:
     assert "UNDERVOLTAGE" not in reported(both)
 
 
-def test_a_help_file_that_cannot_be_read_is_reported() -> None:
+def test_unreadable_help_file_is_reported() -> None:
     profile = library.load_file(library.packaged_folder() / "atv71.toml")
     profile.guide.__dict__["_found"] = ({}, {})
     profile.guide.trouble = "mine.toml:3: there is no such fault."
     assert "mine.toml:3" in reported(view(18, profile=profile))
 
 
-async def test_a_live_value_follows_the_drive() -> None:
+async def test_live_value_follows_the_drive() -> None:
     async with panel() as made:
         made.simulation.drive(1).provoke("ObF")
         await made.on("5")
@@ -124,7 +124,7 @@ async def test_a_live_value_follows_the_drive() -> None:
 
 
 @pytest.mark.sweep
-async def test_the_line_of_keys_stays_at_the_foot() -> None:
+async def test_key_line_stays_at_the_bottom() -> None:
     async with panel() as made:
         await made.on("5")
         await made.until(lambda: "No fault now" in made.shown("doctor"))
@@ -132,13 +132,13 @@ async def test_the_line_of_keys_stays_at_the_foot() -> None:
         assert keys.y == made.app.size.height - 1
 
 
-def test_nothing_is_reported_no_fault() -> None:
+def test_drive_without_a_fault_shows_no_causes() -> None:
     text = reported(view(None, present=False))
     assert "No fault now" in text
     assert "Probably" not in text
 
 
-def test_no_history_is_read_where_a_family_has_none() -> None:
+def test_family_without_a_history_reads_none() -> None:
     profile = library.load("powerdrive")
     text = reported(view(None, profile=profile, present=False, unread=True))
     assert "not known on this drive" in text
@@ -146,7 +146,7 @@ def test_no_history_is_read_where_a_family_has_none() -> None:
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv312"])
-def test_the_fault_before_the_last_is_not_shown_as_the_last(family: str) -> None:
+def test_earlier_fault_is_not_shown_as_the_last(family: str) -> None:
     profile = library.load(family)
     raws = {"LFt": 18, "DP1": 9, "DP2": 5}
     shown = view(None, profile=profile, present=False, readings=readings_of(profile, raws, NOW))
@@ -161,7 +161,7 @@ def test_the_fault_before_the_last_is_not_shown_as_the_last(family: str) -> None
 BRAKING = {"BRA": 1, "VCAL": 4, "ULP0": 2280, "DEC": 30}
 
 
-def test_advice_that_a_value_rules_out_is_not_given() -> None:
+def test_advice_excluded_by_a_value_is_not_shown() -> None:
     fault = readings_of(ATV71, BRAKING, NOW)
     text = reported(view(18, readings=fault), 100, 30)
     assert "(ruled out, BRA Yes) No resistor: set BRA on" in text
@@ -174,7 +174,7 @@ def test_advice_that_a_value_rules_out_is_not_given() -> None:
     assert "No resistor: set BRA on" in open_
 
 
-def test_no_value_that_is_unknown_or_older_fault_rules_anything_out() -> None:
+def test_unknown_value_or_older_fault_excludes_nothing() -> None:
     assert "ruled out" not in reported(view(18))
     without_range = {code: raw for code, raw in BRAKING.items() if code not in ("VCAL", "BRA")}
     assert "ruled out" not in reported(view(18, readings=readings_of(ATV71, without_range, NOW)))
@@ -183,19 +183,19 @@ def test_no_value_that_is_unknown_or_older_fault_rules_anything_out() -> None:
     assert "BRA Yes)" in reported(older, 100, 30)
 
 
-def test_a_value_of_now_does_not_exclude_what_was() -> None:
+def test_current_value_does_not_exclude_a_past_cause() -> None:
     profile = library.load("atv312")
     now = readings_of(profile, {"ULn": 2280, "VCAL": 2}, NOW)
     text = reported(view(None, profile=profile, fault=profile.fault(18), readings=now), 100, 30)
     assert "(not now, ULn 228.0 V) Mains voltage already high" in text
 
 
-def test_the_cause_that_becomes_the_first_is_not_shown_as_surely_known() -> None:
+def test_promoted_cause_is_not_shown_as_certain() -> None:
     readings = readings_of(ATV71, {"VCAL": 4, "ULP0": 2280}, NOW)
     text = reported(view(19, readings=readings), 100, 30)
     assert text.partition("Probably")[2].splitlines()[0].endswith("practice")
 
 
-def test_advice_that_is_excluded_is_read_with_its_fault() -> None:
+def test_values_that_exclude_advice_are_read_with_the_fault() -> None:
     help_ = ATV71.guide.fault(18)
     assert {"BRA", "ULP0", "VCAL"} <= set(codes_to_read(ATV71, help_))

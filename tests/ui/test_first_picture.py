@@ -43,7 +43,7 @@ class FirstPicture(DrivePanelApp):
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 40), (60, 20), (200, 60)])
 @pytest.mark.parametrize("ports", [[], [("/dev/ttyUSB0", "USB-RS485 adapter")]])
-async def test_nothing_is_seen_of_the_fields_that_come_behind_the_first_picture(
+async def test_late_fields_do_not_change_the_first_picture(
     ports: list[tuple[str, str]], size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", lambda: list(ports))
@@ -56,7 +56,7 @@ async def test_nothing_is_seen_of_the_fields_that_come_behind_the_first_picture(
         assert app.first == picture(app)
 
 
-async def test_requests_for_fields_do_not_wait_for_them() -> None:
+async def test_focus_requests_do_not_wait_for_fields() -> None:
     app = DrivePanelApp()
     async with app.run_test() as pilot:
         form = app.connection.form
@@ -67,7 +67,7 @@ async def test_requests_for_fields_do_not_wait_for_them() -> None:
         assert form.query_one("#addresses", Input).value == "3, 5"
 
 
-async def test_a_field_that_is_requested_before_it_is_there_has_the_cursor_then() -> None:
+async def test_field_focused_before_it_exists_gets_the_cursor() -> None:
     app = FirstPicture()
     app.on_first = lambda: app.connection.form.ask_for_addresses()
     async with app.run_test() as pilot:

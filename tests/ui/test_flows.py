@@ -91,7 +91,7 @@ async def to_monitor(app: DrivePanelApp, pilot: Pilot[None], device: int) -> Mon
     return screen
 
 
-async def test_choose_a_drive_watch_it_and_come_back() -> None:
+async def test_drive_is_selected_monitored_and_left() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)
@@ -104,7 +104,7 @@ async def test_choose_a_drive_watch_it_and_come_back() -> None:
         await until(pilot, lambda: not screen.console.monitor.running)
 
 
-async def test_next_and_previous_drive() -> None:
+async def test_keys_select_the_next_and_previous_drive() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         first = await to_monitor(app, pilot, 1)
@@ -126,7 +126,7 @@ async def test_next_and_previous_drive() -> None:
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
 
 
-async def test_a_lost_line_is_shown_and_comes_back() -> None:
+async def test_lost_line_is_shown_until_it_recovers() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)
@@ -140,7 +140,7 @@ async def test_a_lost_line_is_shown_and_comes_back() -> None:
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
 
 
-async def test_a_drive_that_watches_the_line_is_still_polled() -> None:
+async def test_drive_with_a_timeout_is_still_polled() -> None:
     """The Altivar 21 trips after 3 s without a request: found once, it is looked after."""
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
@@ -172,7 +172,7 @@ async def test_frames_help_and_palette_open_and_close() -> None:
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
 
 
-async def test_a_line_that_cannot_be_opened_says_what_to_try() -> None:
+async def test_line_that_cannot_be_opened_shows_advice() -> None:
     app = DrivePanelApp()
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("n")
@@ -182,7 +182,7 @@ async def test_a_line_that_cannot_be_opened_says_what_to_try() -> None:
         assert app.opened is None
 
 
-async def test_percent_becomes_amperes_once_the_rating_is_reported() -> None:
+async def test_percentage_becomes_amperes_once_the_rating_is_known() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 1)
@@ -204,7 +204,7 @@ def alone(line_watch: LineWatch) -> dict[int, float]:
     return {device: watch.timeout for device, watch in line_watch.left_alone().items()}
 
 
-async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
+async def test_leaving_a_drive_with_a_timeout_asks_first() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)
@@ -220,20 +220,20 @@ async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
         await until(pilot, lambda: not app.is_running)
 
 
-async def test_an_unknown_simulated_profile_is_no_crash() -> None:
+async def test_unknown_simulated_profile_is_reported() -> None:
     app = DrivePanelApp(start="sim:nothing")
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: "nothing" in shown(app, "message"))
 
 
-async def test_a_line_and_a_device_on_the_command_line_open_its_monitor() -> None:
+async def test_line_and_device_arguments_open_monitor() -> None:
     app = DrivePanelApp(start="sim:atv71@2", device=2)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         await until(pilot, lambda: "press a, then r" in shown(app, "state"))
 
 
-def test_every_action_has_a_method_and_words() -> None:
+def test_every_action_has_a_method_and_a_text() -> None:
     screens = (
         ConnectionScreen,
         MonitorScreen,
@@ -257,7 +257,7 @@ def test_every_action_has_a_method_and_words() -> None:
         assert set(action.screens) <= set(EVERYWHERE)
 
 
-async def test_only_changed_lines_are_drawn() -> None:
+async def test_only_changed_rows_are_drawn() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)
@@ -272,7 +272,9 @@ async def test_only_changed_lines_are_drawn() -> None:
 
 
 @pytest.mark.parametrize(("size", "place"), [((80, 24), "trend"), ((120, 40), "word0")])
-async def test_another_word_of_bits_draws_that_alone(size: tuple[int, int], place: str) -> None:
+async def test_selecting_another_bit_word_draws_that_alone(
+    size: tuple[int, int], place: str
+) -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=size) as pilot:
         screen = await to_monitor(app, pilot, 2)
@@ -288,7 +290,7 @@ async def test_another_word_of_bits_draws_that_alone(size: tuple[int, int], plac
         assert [line.plain for line in motor.lines] == ["as it was"]
 
 
-async def test_nothing_is_drawn_below_the_help_and_it_is_reported_that_values_stand_still(
+async def test_help_pauses_drawing_below_it_and_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("tui.screens.monitor.screen.FROZEN_AFTER", 0.5)
@@ -311,7 +313,7 @@ async def test_nothing_is_drawn_below_the_help_and_it_is_reported_that_values_st
 
 
 @pytest.mark.parametrize("size", kept([(80, 24), (120, 40)], (80, 24)))
-async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
+async def test_selecting_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=size) as pilot:
         screen = await to_monitor(app, pilot, 2)
@@ -326,7 +328,7 @@ async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
         assert len(titles) > 1
 
 
-async def test_how_often_the_drive_is_requested_is_reported() -> None:
+async def test_polling_rate_is_shown() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)
@@ -334,7 +336,7 @@ async def test_how_often_the_drive_is_requested_is_reported() -> None:
         await until(pilot, lambda: "polled 5.0 times a second" in shown(app, "said"))
 
 
-async def test_on_a_slow_link_frames_come_a_few_at_a_time_and_are_all_there_held() -> None:
+async def test_slow_link_shows_few_frames_but_all_when_paused() -> None:
     app = DrivePanelApp(open_line=demo, start="demo", low_bandwidth=True)
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)

@@ -55,9 +55,7 @@ rows = st.builds(
 
 
 @given(st.integers(36, 180), rows, rows)
-def test_nothing_in_a_row_moves_whatever_it_says(
-    width: int, wall_row: WallRow, other: WallRow
-) -> None:
+def test_columns_of_a_row_never_move(width: int, wall_row: WallRow, other: WallRow) -> None:
     columns = columns_for(width)
     lines = [wall_line(row, columns) for row in (wall_row, other)]
     assert {len(line.plain) for line in lines} == {columns.taken}
@@ -65,7 +63,7 @@ def test_nothing_in_a_row_moves_whatever_it_says(
     assert len(column_heads(columns).plain) == columns.taken
 
 
-def test_small_width_drops_load_then_name() -> None:
+def test_narrow_row_drops_load_then_name() -> None:
     kept = [columns_for(width) for width in (180, 86, 70, 53)]
     assert [(bool(columns.load), bool(columns.name), bool(columns.drive)) for columns in kept] == [
         (True, True, True),
@@ -75,11 +73,11 @@ def test_small_width_drops_load_then_name() -> None:
     ]
 
 
-def test_faults_come_first_in_the_order_in_which_they_came() -> None:
+def test_faults_come_first_in_order_of_occurrence() -> None:
     assert in_order([1, 3, 9, 17, 20], [17, 3]) == [17, 3, 1, 9, 20]
 
 
-def test_the_heading_tells_how_many_are_in_fault_lost_and_found() -> None:
+def test_heading_counts_drives_in_fault_lost_and_found() -> None:
     drives = [
         WallRow(1, "", kind="fault"),
         WallRow(2, "", kind="unknown", words="lost"),
@@ -90,7 +88,7 @@ def test_the_heading_tells_how_many_are_in_fault_lost_and_found() -> None:
 
 
 @pytest.mark.parametrize(("share", "filled"), [(None, 0), (0.0, 0), (0.5, 5), (1.0, 10), (1.5, 10)])
-def test_the_load_is_a_bar_up_to_the_rated_current(share: float | None, filled: int) -> None:
+def test_load_bar_ends_at_the_rated_current(share: float | None, filled: int) -> None:
     bar = load_bar(share, 10)
     assert bar.cell_len == 10
     assert abs(bar.plain.count("━") - filled) <= 1
@@ -98,23 +96,23 @@ def test_the_load_is_a_bar_up_to_the_rated_current(share: float | None, filled: 
     assert bool(over) is (share is not None and share > 1)
 
 
-def test_a_profile_that_is_a_guess_says_so_and_names_the_others() -> None:
+def test_guessed_profile_is_marked_with_its_alternatives() -> None:
     drive = found(NAMELESS, "powerdrive", guessed=True)
     assert "profile Powerdrive ?" in about_drive(drive)
     assert "proxidrive or varmeca" in next_step(drive)
 
 
-def test_a_drive_that_named_itself_has_no_sign() -> None:
+def test_identified_drive_has_no_mark() -> None:
     drive = found(fakes.ATV71, guessed=False)
     assert "?" not in about_drive(drive)
     assert not next_step(drive)
 
 
-def test_a_drive_without_profile_says_so() -> None:
+def test_drive_without_a_profile_says_so() -> None:
     assert "no profile" in about_drive(found(NAMELESS, None, guessed=False))
 
 
-async def test_a_new_state_moves_nothing_in_a_long_list_of_drives(
+async def test_new_state_moves_nothing_in_a_long_drive_list(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     app = fakes.app_of()
@@ -169,7 +167,7 @@ def taken() -> tuple[Fleet, DriveConsole]:
     return fleet, fleet.take(session)
 
 
-def test_a_drive_whose_typed_profile_is_none_keeps_its_stop() -> None:
+def test_drive_keeps_its_stop_if_another_drive_replaces_it() -> None:
     fleet, console = taken()
     fleet.note(fakes.ATV71)
     assert fleet.consoles == [console]
@@ -177,7 +175,7 @@ def test_a_drive_whose_typed_profile_is_none_keeps_its_stop() -> None:
     assert fleet.consoles == []
 
 
-def test_a_motor_that_runs_from_here_is_not_taken_for_another_family() -> None:
+def test_drive_commanded_by_the_panel_keeps_its_family() -> None:
     fleet, console = taken()
     other = DriveSession(fleet.line, 2, library.load("atv21"), fakes.ATV71)
     console.session.note_command()

@@ -74,7 +74,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("key", kept(["1", "2", "3", "4", "5", "6", "7", "m"], "1", "3"))
-async def test_the_strip_tells_the_motor_on_every_screen(key: str) -> None:
+async def test_status_bar_shows_the_motor_on_every_screen(key: str) -> None:
     async with panel() as made:
         await made.on(key)
         await made.until(lambda: "FORWARD" in made.shown("strip") and "Hz" in made.shown("strip"))
@@ -84,7 +84,7 @@ async def test_the_strip_tells_the_motor_on_every_screen(key: str) -> None:
 @pytest.mark.parametrize(
     "key", kept(["3", "4", "z", "question_mark", "ctrl+p"], "3", "question_mark")
 )
-async def test_a_trip_is_reported_there_and_over_dialogs(key: str) -> None:
+async def test_trip_is_shown_in_the_status_bar_and_over_dialogs(key: str) -> None:
     async with panel() as made:
         await made.pilot.press(key)
         made.simulation.drive(1).provoke("ObF")
@@ -94,7 +94,7 @@ async def test_a_trip_is_reported_there_and_over_dialogs(key: str) -> None:
         assert made.bells == [None]  # type: ignore[attr-defined]
 
 
-async def test_a_fault_stays_unseen_until_faults_was_looked_at() -> None:
+async def test_fault_is_new_until_faults_is_opened() -> None:
     async with panel() as made:
         made.simulation.drive(1).provoke("ObF")
         await made.until(lambda: made.app.fleet is not None and made.app.fleet.alarms.unseen)
@@ -109,7 +109,7 @@ async def test_a_fault_stays_unseen_until_faults_was_looked_at() -> None:
         assert made.app.fleet.journal.recent == ()
 
 
-async def test_enter_opens_the_parameter_that_a_fault_points_at() -> None:
+async def test_enter_opens_the_parameter_of_a_fault() -> None:
     async with panel() as made:
         made.simulation.drive(1).provoke("ObF")
         await made.on("5")
@@ -119,7 +119,7 @@ async def test_enter_opens_the_parameter_that_a_fault_points_at() -> None:
         await made.until(lambda: made.shown("detail").lstrip().startswith("DEC"))
 
 
-async def test_a_stop_is_reported_where_it_was_given() -> None:
+async def test_stop_is_reported_on_the_screen_where_it_was_given() -> None:
     async with panel() as made:
         await made.on("3")
         await made.pilot.press("space")
@@ -127,7 +127,7 @@ async def test_a_stop_is_reported_where_it_was_given() -> None:
         await made.until(lambda: "topped" in made.shown("said"), 60.0)
 
 
-async def test_a_question_leaves_the_strip_live() -> None:
+async def test_status_bar_is_updated_during_a_question() -> None:
     async with panel() as made:
         await made.pilot.press("z")
         await made.until(lambda: isinstance(made.app.screen, Question))
@@ -137,9 +137,7 @@ async def test_a_question_leaves_the_strip_live() -> None:
 
 
 @pytest.mark.parametrize("part", ["said", "strip", "state", "top"])
-async def test_a_screen_on_its_way_out_is_drawn_no_more(
-    part: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+async def test_closing_screen_is_not_drawn(part: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """When the panel ends the parts go one by one, and the next look may come between."""
     async with panel() as made:
         screen = made.app.screen
@@ -152,7 +150,7 @@ async def test_a_screen_on_its_way_out_is_drawn_no_more(
             made.app.exit()
 
 
-async def test_on_a_slow_link_figures_are_drawn_seldom_and_a_trip_at_once(
+async def test_slow_link_draws_values_rarely_and_a_trip_immediately(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     async with panel() as made:

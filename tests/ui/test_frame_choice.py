@@ -63,11 +63,11 @@ def reported(frames: Sequence[Frame]) -> list[str]:
         ("nothing says so", []),
     ],
 )
-def test_typed_filter_chooses_whole_exchanges(typed: str, shown: list[int]) -> None:
+def test_typed_filter_selects_whole_exchanges(typed: str, shown: list[int]) -> None:
     assert chosen(LOG, choice_of(typed), reported, tcp=False) == shown
 
 
-def test_a_number_is_a_drive_and_bytes_are_found_by_their_letters() -> None:
+def test_filter_number_is_a_drive_and_letters_match_bytes() -> None:
     assert choice_of("2329") == FrameChoice(devices=frozenset({2329}))
     assert choice_of("0c81").words == ("0c81",)
     assert chosen(LOG, choice_of("0c81"), reported, tcp=False) == [*READ, *SILENT, *LAST]
@@ -75,13 +75,13 @@ def test_a_number_is_a_drive_and_bytes_are_found_by_their_letters() -> None:
 
 @given(typed=st.text(max_size=20), data=st.lists(st.binary(max_size=12), max_size=6))
 @pytest.mark.sweep
-def test_whatever_is_typed_chooses_frames_that_are_there(typed: str, data: list[bytes]) -> None:
+def test_any_filter_selects_existing_frames(typed: str, data: list[bytes]) -> None:
     log = [Frame(0.0, "out" if at % 2 else "in", item) for at, item in enumerate(data)]
     found = chosen(log, choice_of(typed), reported, tcp=False)
     assert found == sorted(set(found) & set(range(len(log))))
 
 
-def test_gaps_are_those_on_the_line_whichever_frames_are_shown() -> None:
+def test_gaps_are_those_of_the_line_whatever_the_filter() -> None:
     assert gaps(LOG)[:3] == [None, pytest.approx(0.01), pytest.approx(0.49)]
     texts = [gap_text(value) for value in (None, 0.0, 0.0123, 9.99, 10.0, 3600.0)]
     assert [text.strip() for text in texts] == [
@@ -89,11 +89,11 @@ def test_gaps_are_those_on_the_line_whichever_frames_are_shown() -> None:
     ]  # fmt: skip
 
 
-def test_the_time_of_day_has_its_thousandths(utc: None) -> None:
+def test_time_of_day_has_milliseconds(utc: None) -> None:
     assert frame_time(1_795_259_250.0625) == "11:07:30.062"
 
 
-def test_saved_frames_have_a_line_each_with_gap(utc: None) -> None:
+def test_each_saved_frame_has_a_line_with_its_gap(utc: None) -> None:
     places = chosen(LOG, choice_of("write 2"), reported, tcp=False)
     words = [reported(LOG)[at] for at in places]
     text = frames_text(LOG, places, words, 1_795_259_250.0, ["ttyUSB0", "2 frames"])

@@ -31,7 +31,7 @@ def listed(made: Panel) -> list[str]:
     return made.shown("frames").splitlines()[1:]
 
 
-async def test_nothing_takes_the_focus_so_that_space_stops() -> None:
+async def test_nothing_has_the_focus_so_that_space_stops() -> None:
     async with on_frames() as made:
         assert made.app.screen.focused is None
         await made.until(lambda: "Space STOP" in made.shown("keys"))
@@ -43,7 +43,7 @@ async def test_nothing_takes_the_focus_so_that_space_stops() -> None:
         await made.until(lambda: "STOP" in made.shown("strip") or "STANDBY" in made.shown("strip"))
 
 
-async def test_a_filter_narrows_the_list_while_it_is_typed_and_esc_ends_it() -> None:
+async def test_filter_applies_while_typed_and_esc_clears_it() -> None:
     async with on_frames() as made:
         await made.until(lambda: len(listed(made)) > 8)
         await made.pilot.press("O", *"rfr")
@@ -61,7 +61,7 @@ async def test_a_filter_narrows_the_list_while_it_is_typed_and_esc_ends_it() -> 
 
 
 @pytest.mark.sweep
-async def test_errors_alone_are_shown_with_what_was_requested() -> None:
+async def test_errors_filter_shows_errors_with_their_requests() -> None:
     async with on_frames() as made:
         assert made.app.opened is not None
         await made.pilot.press("O", *"error", "enter")
@@ -72,7 +72,7 @@ async def test_errors_alone_are_shown_with_what_was_requested() -> None:
         assert any("→" in line for line in listed(made))
 
 
-async def test_find_holds_the_list_and_goes_on_to_older_frames() -> None:
+async def test_find_pauses_the_list_and_continues_to_older_frames() -> None:
     async with on_frames() as made:
         await made.until(lambda: made.shown("frames").count("RFR") > 8)
         screen = made.app.screen
@@ -92,7 +92,7 @@ async def test_find_holds_the_list_and_goes_on_to_older_frames() -> None:
 
 
 @pytest.mark.sweep
-async def test_scrolling_holds_and_goes_no_further_than_the_ends() -> None:
+async def test_scrolling_pauses_and_stops_at_the_ends() -> None:
     async with on_frames() as made:
         await made.until(lambda: len(listed(made)) > 15)
         await made.pilot.press("up")
@@ -110,7 +110,7 @@ async def test_scrolling_holds_and_goes_no_further_than_the_ends() -> None:
         assert listed(made) == newest
 
 
-async def test_the_frames_that_are_shown_are_saved_as_a_text(tmp_path: Path) -> None:
+async def test_shown_frames_are_saved_as_text(tmp_path: Path) -> None:
     async with on_frames() as made:
         await made.pilot.press("O", *"1 read", "enter", "h", "ctrl+s")
         await made.until(lambda: isinstance(made.app.screen, Ask))
@@ -126,7 +126,7 @@ async def test_the_frames_that_are_shown_are_saved_as_a_text(tmp_path: Path) -> 
         assert "only 1 read" in text
 
 
-async def test_counters_of_the_open_drive_on_both_sides() -> None:
+async def test_counters_of_the_open_drive_are_shown_for_both_sides() -> None:
     async with on_frames() as made:
         await made.pilot.press("tab", "tab")
         await made.until(lambda: "Counters of drive 1" in made.shown("frames"))
@@ -148,7 +148,7 @@ async def test_counters_of_the_open_drive_on_both_sides() -> None:
         await made.until(lambda: "Frames on the line" in made.shown("frames"))
 
 
-async def test_the_drives_own_counters_are_reset_after_a_question_only() -> None:
+async def test_drive_counters_are_reset_only_after_confirmation() -> None:
     async with on_frames() as made:
         await made.pilot.press("Z")
         await made.until(lambda: "Tab shows the counters first" in made.shown("said"))

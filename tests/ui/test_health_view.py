@@ -18,7 +18,7 @@ def counted(line: LastMinute, drive: LastMinute, device: int = 247) -> LineCount
 
 
 @pytest.mark.parametrize("width", [60, 79, 80, 100, 119, 120, 200])
-def test_no_figure_moves_another_and_none_is_cut_off(width: int) -> None:
+def test_figures_never_move_and_are_never_cut(width: int) -> None:
     shown = [
         [line.plain for line in health_lines(counted(minute, minute), 247, width)]
         for minute in (LastMinute(), WELL, POOR, MANY)
@@ -32,12 +32,12 @@ def test_no_figure_moves_another_and_none_is_cut_off(width: int) -> None:
 
 
 @pytest.mark.parametrize("width", [60, 80, 120])
-def test_the_rows_are_as_many_with_a_drive_and_without(width: int) -> None:
+def test_row_count_is_the_same_without_a_drive(width: int) -> None:
     found = counted(WELL, WELL)
     assert len(health_lines(found, 247, width)) == len(health_lines(found, None, width))
 
 
-def test_the_figures_at_80_columns() -> None:
+def test_figures_fit_80_columns() -> None:
     drive = LastMinute(good=81, lost=38, silent=2, damaged=3, strays=2)
     line, own = health_lines(counted(POOR, drive, 2), 2, 80)
     words = "Line 60 s 92 % of 530 good 38 lost 3 damaged 14 foreign 2 strays"
@@ -47,7 +47,7 @@ def test_the_figures_at_80_columns() -> None:
     assert " ".join(own.plain.split()) == words
 
 
-def test_only_what_is_a_trouble_is_colored() -> None:
+def test_only_troubles_are_colored() -> None:
     def alarming(minute: LastMinute) -> list[str]:
         line = health_lines(counted(minute, WELL), None, 80)[0]
         return [line.plain[s.start : s.end].strip() for s in line.spans if s.style == ALARM]

@@ -67,7 +67,7 @@ async def heard(app: DrivePanelApp, pilot: Pilot[None], peer: PtyPeer) -> None:
     assert "← 6 ETA 16#0637" in shown(app, "frames")
 
 
-async def test_a_line_that_is_not_open_is_listened_to_and_given_back() -> None:
+async def test_closed_line_is_monitored_and_released() -> None:
     with PtyPeer(silent) as peer:
         app = DrivePanelApp()
         async with app.run_test(size=(80, 24)) as pilot:
@@ -96,7 +96,7 @@ async def test_a_line_that_is_not_open_is_listened_to_and_given_back() -> None:
             await until(pilot, lambda: app.screen is app.connection and not app.hearing)
 
 
-async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_behind(
+async def test_second_key_while_opening_leaves_no_monitor_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A slow computer opens it for a while: a second listener would keep the port for ever."""
@@ -136,7 +136,7 @@ async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_beh
             await heard(app, pilot, peer)
 
 
-async def test_another_master_on_opening_is_offered_to_be_listened_to() -> None:
+async def test_monitoring_is_offered_if_another_master_is_active() -> None:
     with PtyPeer(silent) as peer:
         app = DrivePanelApp(start=f"{peer.path},19200,8E1")
         async with app.run_test(size=(80, 24)) as pilot:
@@ -172,7 +172,7 @@ async def panel_with(
             yield app, pilot, peer
 
 
-async def test_a_drive_that_the_panel_feeds_is_not_left_alone() -> None:
+async def test_drive_kept_alive_by_the_panel_blocks_monitoring() -> None:
     async with panel_with(DriveSpec("atv21", 1)) as (app, pilot, peer):
         await pilot.press("7", "H")
         await until(pilot, lambda: "Not listened to, as the panel feeds drives" in output(app))
@@ -182,7 +182,7 @@ async def test_a_drive_that_the_panel_feeds_is_not_left_alone() -> None:
         assert not app.hearing
 
 
-async def test_drives_that_do_not_act_are_left_to_their_master_with_a_yes() -> None:
+async def test_monitoring_pauses_polling_after_confirmation() -> None:
     async with panel_with(DriveSpec("atv71", 6)) as (app, pilot, peer):
         await pilot.press("H")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
@@ -229,7 +229,7 @@ def fleet_of(watch: Watch, *drives: FoundDrive, link: Link | None = None) -> Fle
     return cast("Fleet", fleet)
 
 
-def test_why_the_panel_may_not_fall_silent() -> None:
+def test_reasons_that_block_monitoring_are_named() -> None:
     console = fakes.console_of(None)
     found, session = FoundDrive(fakes.ATV71, console), console.session
     nameless = DriveIdentity(9, "", "", "", "", None, ())

@@ -32,7 +32,7 @@ def named(key: str) -> str:
 
 
 @pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
-def test_a_page_has_the_keys_of_now(path: Path) -> None:
+def test_pages_have_the_current_keys(path: Path) -> None:
     text = path.read_text("utf-8")
     assert text == with_tables(text), MAKE
 
@@ -41,7 +41,7 @@ def test_every_screen_has_its_table() -> None:
     assert set(tables()) == {*EVERYWHERE, EVERY_SCREEN}
 
 
-def test_the_pages_tell_every_key_and_no_other() -> None:
+def test_pages_list_every_key_and_no_other() -> None:
     reported = {
         (of, key)
         for of, table in tables().items()
@@ -62,13 +62,13 @@ def test_the_pages_tell_every_key_and_no_other() -> None:
     assert reported - wanted == set()
 
 
-def test_every_action_is_reported_in_its_words() -> None:
+def test_every_action_has_its_text_on_the_page() -> None:
     for action in ACTIONS:
         of = EVERY_SCREEN if action.app or action.first else action.screens[0]
         assert action.help in tables()[of]
 
 
-def test_the_screens_stand_by_their_digits() -> None:
+def test_screens_are_listed_by_their_digits() -> None:
     index = (PAGES[0].parent / "README.md").read_text("utf-8")
     for screen in SCREENS:
         row = f"| {screen.digit or screen.key} | [{screen.title}]({screen.name}.md) |"
@@ -76,7 +76,7 @@ def test_the_screens_stand_by_their_digits() -> None:
         assert not screen.about or (PAGES[0].parent / f"{screen.name}.md").is_file()
 
 
-def test_a_page_that_lags_behind_is_written_anew(tmp_path: Path) -> None:
+def test_outdated_page_is_rewritten(tmp_path: Path) -> None:
     page = tmp_path / "frames.md"
     page.write_text("A\n<!-- keys of frames -->\n| h | Old. |\n<!-- end of keys -->\nB\n", "utf-8")
     write_pages(tmp_path)
@@ -87,7 +87,7 @@ def test_a_page_that_lags_behind_is_written_anew(tmp_path: Path) -> None:
     assert "Old." not in written
 
 
-def test_actions_without_key_follow_the_table() -> None:
+def test_actions_without_a_key_follow_the_table() -> None:
     table = key_table("line")
     assert "- Close the line. Asks first if a drive reacts to that." in table
     assert "|  |" not in table

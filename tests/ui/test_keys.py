@@ -77,12 +77,12 @@ def meanings() -> dict[str, set[str]]:
     return found
 
 
-def test_a_key_means_one_thing_on_every_screen() -> None:
+def test_key_has_one_meaning_on_every_screen() -> None:
     clashes = {key: ids for key, ids in meanings().items() if len(ids) > 1 and key not in GENERIC}
     assert clashes == {}
 
 
-def test_no_generic_key_is_excused_that_needs_it_no_more() -> None:
+def test_every_exception_for_a_generic_key_is_needed() -> None:
     used = {key for key, ids in meanings().items()}
     assert set(GENERIC) <= used
 
@@ -99,14 +99,14 @@ def test_a_key_has_one_action_on_a_screen(screen: str) -> None:
     assert len(keys) == len(set(keys))
 
 
-def test_a_key_of_every_screen_is_none_of_a_single_one() -> None:
+def test_global_keys_are_not_reused_by_a_screen() -> None:
     everywhere = {key for a in ACTIONS if a.app for key in a.keys.split(",")}
     single = {key for a in ACTIONS if not a.app for key in a.keys.split(",") if key}
     assert everywhere & single == set()
     assert {a.screens for a in ACTIONS if a.app} == {EVERYWHERE}
 
 
-def test_letters_that_stop_at_once_are_stops() -> None:
+def test_letters_that_act_immediately_are_stops() -> None:
     assert {*LETTERS, *AT_ONCE} == set(string.ascii_letters)
     found = {a.keys: a.id for a in ACTIONS if a.keys in AT_ONCE}
     assert found == {key: f"stop_as('{order}')" for key, order in AT_ONCE.items()}
@@ -115,7 +115,7 @@ def test_letters_that_stop_at_once_are_stops() -> None:
 # A key without a meaning on a screen
 
 
-def test_keys_have_a_meaning_on_their_screen() -> None:
+def test_every_key_has_a_meaning_on_its_screen() -> None:
     assert elsewhere(CONNECTION, "r").startswith("r has a meaning on Monitor (2): Run forward")
     assert elsewhere("frames", "V").startswith("V has a meaning on Scanner (4)")
     assert elsewhere("monitor", "asterisk", "*").startswith("* has a meaning on Parameters (3)")
@@ -143,7 +143,7 @@ def strange_on(screen: str) -> dict[str, Action]:
 
 
 @pytest.mark.sweep  # every key on every screen
-async def test_a_key_without_a_meaning_says_where_it_has_one_and_does_nothing() -> None:
+async def test_key_without_a_meaning_says_where_it_works_and_does_nothing() -> None:
     async with bench("atv71") as made:
         await made.armed()
         for screen, way in KEY_OF.items():
@@ -174,7 +174,7 @@ def attributes_of_classes(path: Path) -> Iterator[str]:
                 yield from (part.name for part in parts)
 
 
-def test_nothing_has_the_name_of_a_key() -> None:
+def test_no_method_has_the_name_of_a_key() -> None:
     """Textual calls what is named key_ and the name of a key: @ is called at."""
     named = {
         f"{path.relative_to(PACKAGE)}: {name}"
@@ -185,7 +185,7 @@ def test_nothing_has_the_name_of_a_key() -> None:
     assert named == set()
 
 
-async def test_a_sign_that_is_called_like_a_word_ends_nothing() -> None:
+async def test_key_with_a_word_as_its_name_ends_nothing() -> None:
     app = fakes.app_of()
     async with app.run_test() as pilot:
         for place in (None, Confirm("Write?", "It is written.", yes="y", no="n", loses=True)):
@@ -202,7 +202,7 @@ def notices(made: Bench) -> str:
 
 
 @pytest.mark.parametrize("key", kept("123567", "1", "3"))
-async def test_text_after_slash_is_searched_for(key: str) -> None:
+async def test_text_after_slash_is_searched(key: str) -> None:
     """Typed at once on a slow machine, it was a key of the screen below: `a` armed."""
     async with bench("atv71") as made:
         await made.pilot.press(key)
@@ -215,7 +215,9 @@ async def test_text_after_slash_is_searched_for(key: str) -> None:
         assert not made.app.chosen.session.arming.armed
 
 
-async def test_on_a_slow_computer_too(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_text_after_slash_is_searched_on_a_slow_computer(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A screen that takes half a second to come let the `a` arm."""
     compose = ParametersScreen.compose
 
@@ -264,7 +266,7 @@ SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}
         if name not in (OPENING, LISTENING)  # there is nothing to write to
     ],
 )
-async def test_no_letter_writes_without_a_question_or_a_line(screen: str) -> None:
+async def test_no_letter_writes_without_confirmation(screen: str) -> None:
     """Armed, with work that waits to be written; a question that comes is left unanswered."""
     async with bench("atv71") as made:
         await stage(made)
@@ -407,7 +409,7 @@ async def test_a_key_waits_if_its_effect_is_not_known(monkeypatch: pytest.Monkey
 
 @pytest.mark.parametrize("raws", [fakes.READY, fakes.FAULT], ids=["ready", "fault"])
 @pytest.mark.parametrize("armed", [None, 57.0])
-def test_a_key_that_cannot_work_now_is_dim(raws: dict[str, int], armed: float | None) -> None:
+def test_unavailable_key_is_dim(raws: dict[str, int], armed: float | None) -> None:
     faulty = raws is fakes.FAULT
     view = replace(view_of(library.load("atv71"), raws), control=Control(armed_for=armed))
     line = order_keys(view, keys_line("monitor", 80))

@@ -70,7 +70,7 @@ def settings(text: str) -> None:
     settings_file().write_text(text, "utf-8")
 
 
-async def test_another_drive_needs_confirmation_and_read_only_till_then(
+async def test_changed_drive_is_read_only_until_confirmed(
     simulation: Simulation,
 ) -> None:
     line = rtu_tcp(simulation)
@@ -107,7 +107,7 @@ async def test_another_drive_needs_confirmation_and_read_only_till_then(
     assert load_memory().lines[line_key(line)].drives[2].profile == "atv71"
 
 
-async def test_a_line_that_is_as_it_was_is_not_questioned(simulation: Simulation) -> None:
+async def test_unchanged_line_needs_no_confirmation(simulation: Simulation) -> None:
     line = rtu_tcp(simulation)
     for _ in range(2):
         await opened_unasked(line)
@@ -126,7 +126,7 @@ async def opened_unasked(line: str) -> None:
         await until(pilot, lambda: "nothing to accept" in shown(app, "said"))
 
 
-async def test_it_is_still_polledce_the_search_is_over(simulation: Simulation) -> None:
+async def test_question_about_a_changed_line_comes_after_the_scan(simulation: Simulation) -> None:
     line = rtu_tcp(simulation)
     another_before(line)
     app = DrivePanelApp(start=line)
@@ -140,7 +140,7 @@ async def test_it_is_still_polledce_the_search_is_over(simulation: Simulation) -
         await until(pilot, lambda: isinstance(app.screen, Confirm))
 
 
-async def test_an_adapter_that_changed_while_the_line_was_lost_needs_confirmation(
+async def test_adapter_changed_while_the_line_was_lost_needs_confirmation(
     adapters: Adapters,
 ) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
@@ -196,7 +196,7 @@ async def test_question_waits_for_monitor_to_replace_first_picture(adapters: Ada
         assert isinstance(app.screen, Confirm)
 
 
-async def test_question_that_monitor_has_replaced_comes_again(adapters: Adapters) -> None:
+async def test_question_replaced_by_monitor_is_shown_again(adapters: Adapters) -> None:
     async with lost_with_adapter_changed(adapters) as pilot:
         app = pilot.app
         assert isinstance(app, DrivePanelApp)
@@ -216,7 +216,7 @@ async def test_question_that_monitor_has_replaced_comes_again(adapters: Adapters
         assert isinstance(app.screen, MonitorScreen), "it was answered"
 
 
-async def test_question_below_another_screen_comes_again_once(adapters: Adapters) -> None:
+async def test_question_below_another_screen_is_shown_again_once(adapters: Adapters) -> None:
     async with lost_with_adapter_changed(adapters) as pilot:
         app = pilot.app
         assert isinstance(app, DrivePanelApp)
@@ -236,9 +236,7 @@ async def test_question_below_another_screen_comes_again_once(adapters: Adapters
         await until(pilot, lambda: app.screen is app.connection)
 
 
-async def test_a_port_is_remembered_by_its_adapter(
-    adapters: Adapters, simulation: Simulation
-) -> None:
+async def test_port_is_stored_by_its_adapter(adapters: Adapters, simulation: Simulation) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5", leads_to=Path(simulation.serve_pty()))
     app = DrivePanelApp(start=port, device=2)
     async with app.run_test(size=(80, 24)) as pilot:
@@ -249,7 +247,7 @@ async def test_a_port_is_remembered_by_its_adapter(
     assert line_name(parse_link(recent)).key == line_name(parse_link(port)).key
 
 
-async def test_a_named_line_is_offered_and_opens_its_drive(simulation: Simulation) -> None:
+async def test_named_line_is_listed_and_opens_its_drive(simulation: Simulation) -> None:
     settings(
         f'[lines.fan]\nline = "{rtu_tcp(simulation)}"\ndevice = 5\nprofile = "powerdrive"\n'
         "[lines.old]\nline = 3\n"
@@ -274,7 +272,7 @@ async def test_a_named_line_is_offered_and_opens_its_drive(simulation: Simulatio
         assert app.connection.query_one("#addresses", Input).value == "5"
 
 
-async def test_a_drive_of_a_guessed_family_is_never_shown_as_stopped(
+async def test_drive_of_a_guessed_family_is_never_shown_as_stopped(
     simulation: Simulation,
 ) -> None:
     drive = simulation.drive(5)
@@ -294,7 +292,7 @@ async def test_a_drive_of_a_guessed_family_is_never_shown_as_stopped(
         assert "it is not known if the motor stopped" in picture(app)
 
 
-async def test_a_name_may_be_typed(simulation: Simulation) -> None:
+async def test_line_name_may_be_typed(simulation: Simulation) -> None:
     settings(f'[lines.fan]\nline = "{rtu_tcp(simulation)}"\ndevice = 5\n')
     app = DrivePanelApp()
     async with app.run_test(size=(80, 24)) as pilot:
@@ -307,7 +305,7 @@ async def test_a_name_may_be_typed(simulation: Simulation) -> None:
         assert 2 not in app.connection.found
 
 
-async def test_a_drive_that_says_who_it_is_is_believed_before_the_settings(
+async def test_identification_overrides_the_profile_in_the_settings(
     simulation: Simulation,
 ) -> None:
     settings(f'[lines.all]\nline = "{rtu_tcp(simulation)}"\nprofile = "powerdrive"\n')
@@ -318,7 +316,7 @@ async def test_a_drive_that_says_who_it_is_is_believed_before_the_settings(
         assert app.chosen.session.profile.id == "atv71"
 
 
-def test_names_stand_above_the_ports_and_no_line_twice() -> None:
+def test_names_are_listed_above_ports_without_duplicates() -> None:
     reported = LineSettings(Path("settings.toml"), {"fan": NamedLine("fan", BY_ID, 5)})
     named, serial, *_ = groups([("/dev/ttyUSB0", "")], [], reported)
     assert (named.title, serial.title) == ("Named", "Serial ports")
@@ -336,7 +334,7 @@ def test_names_stand_above_the_ports_and_no_line_twice() -> None:
         (20, "…T_A50285BI,19200,8E1"[-20:]),
     ],
 )
-def test_of_a_lasting_name_the_end_is_shown(width: int, text: str) -> None:
+def test_long_port_name_shows_its_end(width: int, text: str) -> None:
     reported = line_in(BY_ID, width)
     assert len(reported) <= width
     assert reported[1:] == text[1:]

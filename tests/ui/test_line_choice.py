@@ -82,7 +82,7 @@ async def line(*, first: int = 3, family: str = "atv21") -> AsyncIterator[Line]:
         simulation.stop()
 
 
-async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips(
+async def test_enter_during_the_scan_keeps_the_line_open_without_trips(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # far more empty addresses than three keys take
@@ -107,7 +107,7 @@ async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips(
         assert made.simulation.drive(3).fault is None
 
 
-async def test_another_line_is_opened_beside_one_with_drives() -> None:
+async def test_second_line_is_opened_beside_one_with_drives() -> None:
     async with line() as made:
         app, pilot = made.app, made.pilot
         await until(pilot, lambda: app.connection.drives.option_count == 1)
@@ -124,7 +124,7 @@ async def test_another_line_is_opened_beside_one_with_drives() -> None:
 
 
 @pytest.mark.sweep
-async def test_enter_in_a_field_looks_again_by_what_was_typed() -> None:
+async def test_enter_in_a_field_scans_with_the_typed_values() -> None:
     async with line() as made:
         app, pilot = made.app, made.pilot
         await until(pilot, lambda: app.connection.drives.option_count == 1)
@@ -168,7 +168,7 @@ async def test_typing_into_a_field_changes_no_screen() -> None:
         ("", "tcp:gateway", False),
     ],
 )
-def test_lines_that_are_the_same(text: str, other: str, same: bool) -> None:
+def test_same_line_is_recognized_in_any_spelling(text: str, other: str, same: bool) -> None:
     assert same_line(text, other) is same
     assert same_line(other, text) is same
 
@@ -189,7 +189,7 @@ def lines(*devices: int) -> tuple[dict[int, Text], list[int]]:
     return {device: Text(f"drive {device}") for device in devices}, list(devices)
 
 
-async def test_the_cursor_stays_on_its_drive_not_on_its_row() -> None:
+async def test_cursor_stays_on_its_drive_not_its_row() -> None:
     app = fakes.app_of()
     async with app.run_test(size=(80, 24)) as pilot:
         await app.push_screen(Listed())
@@ -222,7 +222,7 @@ class HandClock(fakes.StillClock):
         return self.now
 
 
-async def test_sorting_waits_while_keys_come() -> None:
+async def test_sorting_waits_while_keys_are_typed() -> None:
     app = fakes.app_of()
     clock = HandClock()
     app.clock = clock
@@ -249,7 +249,7 @@ async def test_sorting_waits_while_keys_come() -> None:
         assert listed.chosen == 4
 
 
-def test_a_simulated_line_that_is_offered_anyway_stands_once() -> None:
+def test_listed_simulated_line_is_not_repeated() -> None:
     serial, recent, simulated = groups(
         [], ["sim:atv71@2,atv21", "sim:atv21@1,atv31@2,atv312@3,atv71@4,powerdrive@5", "tcp:plc"]
     )

@@ -48,13 +48,13 @@ TURNING_ROUND = {**fakes.RUNNING, "FRH": -500, "ETA": 0x0237}
         (fakes.FAULT, None, " FAULT ObF "),
     ],
 )
-def test_the_state_in_words(raws: dict[str, int], armed: float | None, says: str) -> None:
+def test_state_is_described_in_words(raws: dict[str, int], armed: float | None, says: str) -> None:
     control = Control(armed_for=armed, hindrance=hindrance(ATV71, raws))
     view = replace(view_of(ATV71, raws), control=control, stands_by=True)
     assert state_lines(view, 22)[0].plain == says
 
 
-def test_a_fault_says_when_and_where_it_is_informed_what_to_do() -> None:
+def test_fault_has_its_time_and_names_the_key_for_advice() -> None:
     view = replace(view_of(ATV71, fakes.FAULT), fault_at="seen since 16:28:05")
     text = "\n".join(line.plain for line in state_lines(view, 22))
     assert "seen since 16:28:05" in text
@@ -71,7 +71,7 @@ def test_commander_and_reference_source_are_distinguished() -> None:
     assert ["Reference", "keypad"] in text
 
 
-def test_the_block_has_five_lines_whatever_happens() -> None:
+def test_state_block_always_has_five_lines() -> None:
     for raws in (fakes.RUNNING, fakes.FAULT, NO_SUPPLY):
         for age in (0.1, 20.0):
             view = replace(view_of(ATV71, raws, age=age), watch=TimeoutWatch(10.0, None), heard=1.0)
@@ -96,7 +96,7 @@ def test_command_without_effect_names_next_step(
 
 
 @pytest.mark.parametrize("eti", [0x0002, 0x4002])
-def test_an_idle_altivar_312_set_up_for_modbus_is_commanded_by_modbus(eti: int) -> None:
+def test_idle_altivar_312_set_up_for_modbus_is_commanded_by_modbus(eti: int) -> None:
     """Whether its extended status word names the channel yet or not."""
     profile = library.load("atv312")
     raws = {"LAC": 2, "CHCF": 1, "Fr1": 164, "rFC": 96, "LRS3": 0, "ETA": 0x0240, "ETI": eti}
@@ -107,13 +107,13 @@ def test_an_idle_altivar_312_set_up_for_modbus_is_commanded_by_modbus(eti: int) 
     assert hindrance(profile, raws) is None
 
 
-def test_nothing_hinders_a_drive_that_stands_by() -> None:
+def test_ready_drive_has_no_hindrance() -> None:
     assert hindrance(ATV71, fakes.READY) is None
     assert hindrance(library.load("powerdrive"), {"10.40": 3, "6.43": 1}) is None
 
 
 @pytest.mark.parametrize("family", PROFILES)
-def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
+def test_reason_for_an_ineffective_command_is_never_cut(family: str) -> None:
     profile = library.load(family)
     for chart in profile.data.charts:
         for lock in chart.interlocks:
@@ -136,7 +136,7 @@ def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
             assert reported in " ".join(" ".join(lines).split())
 
 
-def test_a_word_says_nothing_of_what_is_so_while_all_is_well() -> None:
+def test_word_line_omits_normal_bits() -> None:
     view = view_of(ATV71, {**fakes.RUNNING, "ETA": 0x0637})
     line = word_line(view, ATV71["ETA"], 79).plain
     assert line.split("16#0637")[1].strip() == (
@@ -162,7 +162,7 @@ def test_a_word_says_nothing_of_what_is_so_while_all_is_well() -> None:
         ("powerdrive", "10.40", 0x0000, "not ready"),
     ],
 )
-def test_word_line_lists_what_is_true_at_0_too(
+def test_word_line_lists_bits_that_are_true_at_0(
     family: str, code: str, raw: int, words: str
 ) -> None:
     profile = library.load(family)
@@ -171,7 +171,7 @@ def test_word_line_lists_what_is_true_at_0_too(
 
 
 @pytest.mark.parametrize("family", PROFILES)
-def test_word_line_lists_nothing_that_the_grid_does_not_light(family: str) -> None:
+def test_word_line_lists_only_bits_lit_in_the_grid(family: str) -> None:
     profile = library.load(family)
     for word in (parameter for parameter in profile.data.parameters if parameter.bits):
         for raw in (0x0000, 0x0027, 0x0207, 0xFFFF):
@@ -181,7 +181,7 @@ def test_word_line_lists_nothing_that_the_grid_does_not_light(family: str) -> No
             assert listed <= lit, (word.code, raw)
 
 
-def test_a_bit_in_columns_says_of_what_it_tells() -> None:
+def test_bit_in_columns_has_its_subject() -> None:
     """At 80 columns two bits of LRS7 read 'In force', and nothing told which channels are."""
     view = view_of(ATV71, {**fakes.RUNNING, "LRS7": 0x0005})
     grid = bit_grid(view, word_pages([ATV71["LRS7"]], 15)[0], 79, 6)
@@ -191,7 +191,7 @@ def test_a_bit_in_columns_says_of_what_it_tells() -> None:
     assert "In force" not in reported
 
 
-def test_addresses_that_are_empty_are_no_failures() -> None:
+def test_empty_addresses_are_not_failures() -> None:
     view = view_of(ATV71, fakes.RUNNING)
     counters = replace(view.counters, timeouts=1, searched=17)
     assert "1 failed" in line_figures(replace(view, counters=counters)).plain
@@ -236,7 +236,7 @@ def _drawn(bit: Bit, raw: int) -> tuple[str, bool]:
         (Bit(bit=3, name="Terminals"), ("Terminals", False), ("Terminals", True)),
     ],
 )
-def test_a_lit_bit_states_what_is_true(
+def test_lit_bit_states_what_is_true(
     bit: Bit, at_0: tuple[str, bool], at_1: tuple[str, bool]
 ) -> None:
     assert _drawn(bit, 0) == at_0

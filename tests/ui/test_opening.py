@@ -70,7 +70,7 @@ def newest(app: DrivePanelApp) -> str:
     return event.text if event is not None else ""
 
 
-async def test_monitor_stands_first_and_its_drive_takes_its_place() -> None:
+async def test_monitor_opens_first_and_then_shows_its_drive() -> None:
     held, seen = Held(), []
     app = DrivePanelApp(
         open_line=held.open,
@@ -92,7 +92,7 @@ async def test_monitor_stands_first_and_its_drive_takes_its_place() -> None:
         assert len(app.screen_stack) == 2, "Esc goes to Line"
 
 
-async def test_escape_cancels_the_opening_of_a_named_drive_and_shows_line() -> None:
+async def test_escape_while_opening_a_named_drive_shows_line() -> None:
     held = Held()
     app = DrivePanelApp(open_line=held.open, start="demo", device=1)
     async with app.run_test(size=(80, 24)) as pilot:
@@ -141,7 +141,7 @@ WAYS = {
 
 
 @pytest.mark.parametrize("way", WAYS.values(), ids=WAYS)
-async def test_keys_typed_while_a_line_opens_do_nothing_and_report_it(
+async def test_keys_typed_while_a_line_opens_are_ignored_and_reported(
     way: Callable[[DrivePanelApp, Pilot[None]], Awaitable[None]],
 ) -> None:
     """The tour's own keys opened another line, which may be a real one, without a question."""
@@ -171,7 +171,7 @@ async def test_keys_typed_while_a_line_opens_do_nothing_and_report_it(
         await until(pilot, lambda: "Esc cancel" not in shown(app, "keys"))
 
 
-async def test_keys_of_the_tour_typed_too_early_open_no_line_and_work_later() -> None:
+async def test_tour_keys_typed_too_early_open_no_line_and_work_later() -> None:
     remember_others()
     held = Held(line={"atv21": 20.0, "atv31": 25.0, "atv312": 30.0, "atv71": 50.0})
     app = DrivePanelApp(open_line=held.open, start="demo")
@@ -188,7 +188,7 @@ async def test_keys_of_the_tour_typed_too_early_open_no_line_and_work_later() ->
         assert held.opened == ["demo"]
 
 
-async def test_a_key_read_while_a_line_opens_is_ignored_though_it_is_handled_later() -> None:
+async def test_key_read_while_a_line_opens_is_ignored_even_if_handled_later() -> None:
     held = Held()
     held.let()
     app = DrivePanelApp(open_line=held.open, start="demo")
@@ -205,7 +205,7 @@ async def test_a_key_read_while_a_line_opens_is_ignored_though_it_is_handled_lat
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
 
 
-async def test_escape_cancels_an_opening_and_another_line_can_be_opened() -> None:
+async def test_escape_cancels_opening_and_another_line_can_be_opened() -> None:
     held = Held()
     app = DrivePanelApp(open_line=held.open, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
@@ -245,7 +245,7 @@ async def test_stops_work_while_a_second_line_opens() -> None:
         await until(pilot, lambda: len(app.panel_lines) == 2)
 
 
-async def test_enter_on_another_line_asks_while_the_search_goes_on(
+async def test_enter_on_another_line_asks_during_the_scan(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Keys of the tour that come between the opening and the first drive."""
@@ -267,7 +267,7 @@ async def test_enter_on_another_line_asks_while_the_search_goes_on(
         assert app.panel_lines
 
 
-async def test_a_line_that_cannot_be_opened_says_why_on_line() -> None:
+async def test_line_that_cannot_be_opened_shows_the_reason() -> None:
     held = Held(PortMissing("There is no /dev/ttyUSB9."))
     app = DrivePanelApp(open_line=held.open, start="/dev/ttyUSB9", device=1)
     async with app.run_test(size=(80, 24)) as pilot:
@@ -277,7 +277,7 @@ async def test_a_line_that_cannot_be_opened_says_why_on_line() -> None:
         await until(pilot, lambda: "There is no /dev/ttyUSB9." in shown(app, "message"))
 
 
-async def test_a_picture_while_the_panel_ends_draws_nothing(
+async def test_screenshot_while_the_panel_exits_draws_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     app = DrivePanelApp(open_line=Held().open)
@@ -291,7 +291,7 @@ async def test_a_picture_while_the_panel_ends_draws_nothing(
         assert not drawn
 
 
-async def test_a_drive_that_does_not_answer_says_so_on_line() -> None:
+async def test_drive_that_does_not_answer_is_reported_on_line() -> None:
     held = Held()
     app = DrivePanelApp(open_line=held.open, start="demo", device=77)
     async with app.run_test(size=(80, 24)) as pilot:

@@ -53,7 +53,7 @@ def output(app: DrivePanelApp) -> str:
     return "\n".join(event.text for event in app.events.events)
 
 
-async def test_a_drive_at_another_baud_is_found_and_the_line_stays_there() -> None:
+async def test_drive_at_another_baud_is_found_and_the_line_keeps_it() -> None:
     drive = DriveSpec("atv71", 1, sets={"TBR": 28})
     with Simulation([drive], timing=LineTiming(19200, "8E1")) as simulation:
         async with panel_on(simulation.serve_pty()) as (app, pilot):
@@ -67,7 +67,7 @@ async def test_a_drive_at_another_baud_is_found_and_the_line_stays_there() -> No
             assert any(",9600,8E1" in line for line in recent_lines())
 
 
-async def test_a_drive_that_would_act_is_left_alone_only_with_a_yes() -> None:
+async def test_drive_with_a_timeout_is_left_unpolled_only_if_confirmed() -> None:
     with Simulation([DriveSpec("atv21", 1)], timing=LineTiming(19200, "8E1")) as simulation:
         async with panel_on(simulation.serve_pty()) as (app, pilot):
             await until(pilot, lambda: set(app.connection.found) == {1})
@@ -92,7 +92,7 @@ async def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.M
             app.connection.action_stop_scan()
 
 
-async def test_unexpected_answer_tries_no_other_setting_unasked() -> None:
+async def test_unexpected_reply_tries_other_settings_only_if_confirmed() -> None:
     def garbled(request: bytes, _count: int) -> Sequence[Step]:
         return [frame(2, bytes.fromhex("03 02 0001"))[:-1] + b"\0"] if request[0] == 2 else []
 
@@ -120,7 +120,7 @@ async def test_possible_drives_are_named_before_first_request() -> None:
             assert " s left." in advice(app)
 
 
-async def test_drives_are_still_polled_while_the_person_decides_known_or_not() -> None:
+async def test_drives_are_still_polled_during_the_question() -> None:
     def refusing(request: bytes, _count: int) -> Sequence[Step]:
         if request[0] == 2:
             return [frame(2, bytes([request[1] | 0x80, 1]))]
@@ -144,7 +144,7 @@ def _requested(peer: PtyPeer, device: int, since: int) -> int:
     return sum(request[0] == device for request in peer.requests[since:])
 
 
-async def test_another_master_is_reported_and_nothing_is_sent() -> None:
+async def test_another_master_ends_the_scan_before_sending() -> None:
     with PtyPeer(silent) as peer:
         async with panel_on(peer.path) as (app, pilot):
             sent = len(peer.requests)
@@ -155,7 +155,7 @@ async def test_another_master_is_reported_and_nothing_is_sent() -> None:
             assert len(peer.requests) == sent
 
 
-async def test_a_search_of_a_port_listens_first() -> None:
+async def test_scan_of_a_port_monitors_first() -> None:
     with PtyPeer(silent) as peer:
         app = DrivePanelApp(start=f"{peer.path},19200,8E1")
         async with app.run_test(size=(80, 24)) as pilot:
@@ -166,7 +166,7 @@ async def test_a_search_of_a_port_listens_first() -> None:
             assert peer.requests == []
 
 
-async def test_esc_ends_the_listening_too(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_esc_ends_the_monitoring_before_a_scan(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 600.0)
     with PtyPeer(silent) as peer:
         app = DrivePanelApp(start=f"{peer.path},19200,8E1")
@@ -177,7 +177,7 @@ async def test_esc_ends_the_listening_too(monkeypatch: pytest.MonkeyPatch) -> No
             assert peer.requests == []
 
 
-async def test_a_line_without_settings_says_so() -> None:
+async def test_line_without_settings_says_so() -> None:
     app = DrivePanelApp(start="sim:atv71")
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: app.opened is not None)

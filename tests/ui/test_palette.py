@@ -44,7 +44,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-def test_every_word_that_was_typed_is_in_what_is_found() -> None:
+def test_every_typed_word_is_in_the_results() -> None:
     for query in ("eeprom", "save eeprom", "EEPROM sav", "frames", "ramp", "trip file"):
         found = find(query, "monitor")
         assert found
@@ -66,7 +66,7 @@ def test_best_match_comes_first() -> None:
 
 
 @pytest.mark.parametrize("screen", kept(EVERYWHERE, "line", "monitor", "control"))
-def test_every_action_is_found_from_everywhere(screen: str) -> None:
+def test_every_action_is_found_on_every_screen(screen: str) -> None:
     for action in ACTIONS:
         if action.id.startswith(NOT_FOUND):
             continue
@@ -92,7 +92,7 @@ def test_motor_commands_need_their_full_name(words: list[str], screen: str) -> N
             assert called == set(names)
 
 
-def test_the_names_are_those_of_actions() -> None:
+def test_palette_names_are_action_names() -> None:
     ids = {action.id for action in ACTIONS}
     assert set(BY_NAME) <= ids
     heads = ("stop", "arm", "run_line", "stop_as", "ask_stop_as", "take_")
@@ -114,7 +114,7 @@ def reports(made: Bench) -> dict[int, object]:
     return dict(made.app.fleet.stopper.reports) if made.app.fleet else {}
 
 
-async def test_eeprom_stops_nothing_and_leads_to_where_it_is_saved() -> None:
+async def test_eeprom_finds_saving_and_no_stop() -> None:
     async with bench("atv71", "atv21", "atv312") as made:
         for device in (1, 2, 3):
             made.drive(device).run(30.0)
@@ -128,7 +128,7 @@ async def test_eeprom_stops_nothing_and_leads_to_where_it_is_saved() -> None:
         assert all(made.speed(device) > 2 for device in (1, 2, 3))
 
 
-async def test_nothing_stands_ready_until_a_word_was_typed() -> None:
+async def test_nothing_is_selected_until_a_word_is_typed() -> None:
     async with bench("atv71") as made:
         for query in ("", "oto", "run", "all", "forward"):
             options = await typed(made, query)
@@ -142,7 +142,7 @@ async def test_nothing_stands_ready_until_a_word_was_typed() -> None:
         assert not reports(made)
 
 
-async def test_arming_and_stopping_by_their_names() -> None:
+async def test_arming_and_stopping_work_by_name() -> None:
     async with bench("atv71", "atv21") as made:
         made.drive(2).run(30.0)
         await until(made.pilot, lambda: made.speed(2) > 2)
@@ -159,7 +159,7 @@ async def test_arming_and_stopping_by_their_names() -> None:
         await made.stopped(2)
 
 
-async def test_an_action_of_this_screen_is_done() -> None:
+async def test_action_of_the_current_screen_is_executed() -> None:
     async with bench("atv71") as made:
         options = await typed(made, "rated current")
         assert options.highlighted == 0
@@ -176,7 +176,7 @@ async def test_an_action_of_this_screen_is_done() -> None:
 
 
 @pytest.mark.sweep
-async def test_every_screen_leads_to_every_other() -> None:
+async def test_every_screen_is_reached_from_every_other() -> None:
     async with bench("atv71") as made:
         before = ""
         for place in every_step(SCREENS):
@@ -187,7 +187,7 @@ async def test_every_screen_leads_to_every_other() -> None:
             before = f"from {place}"
 
 
-async def test_over_a_question_there_is_no_palette() -> None:
+async def test_palette_does_not_open_over_a_question() -> None:
     async with bench("atv71") as made:
         await made.armed()
         await made.pilot.press("z")

@@ -102,7 +102,7 @@ def lines(made: Bench) -> str:
     return " ".join(shown(made.app, "said").split())
 
 
-async def test_find_edit_write_and_read_back() -> None:
+async def test_parameter_is_found_edited_written_and_verified() -> None:
     async with bench("atv312") as made:
         await to_parameters(made)
         await find(made, "ACC")
@@ -128,7 +128,7 @@ async def test_find_edit_write_and_read_back() -> None:
         assert made.drive().raw("ACC") == 75
 
 
-async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() -> None:
+async def test_u_undoes_the_last_edit_and_delete_the_selected_one() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)
         for code in ("ACC", "DEC", "HSP"):
@@ -147,7 +147,7 @@ async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() 
         assert writes(made.app) == []
 
 
-async def test_reports_on_edits_are_true_while_motor_runs() -> None:
+async def test_edit_messages_are_true_while_the_motor_runs() -> None:
     """TFR waits for a standstill: nothing says that w writes it, and it is counted until it is."""
     async with bench("atv71") as made:
         editor = (await to_parameters(made)).editor
@@ -186,7 +186,7 @@ async def test_reports_on_edits_are_true_while_motor_runs() -> None:
         )
 
 
-async def test_a_parameter_is_found_from_every_screen() -> None:
+async def test_parameter_is_found_from_every_screen() -> None:
     async with bench("atv312") as made:
         for key in "2567":
             await made.pilot.press(key, "slash", *"hsp", "enter")
@@ -197,7 +197,7 @@ async def test_a_parameter_is_found_from_every_screen() -> None:
         assert not made.app.chosen.session.arming.armed
 
 
-async def test_the_groups_have_tab_and_the_arrows() -> None:
+async def test_tab_and_arrows_select_groups() -> None:
     async with bench("atv312") as made:
         screen = await to_parameters(made)
         first = screen.listed.code
@@ -210,7 +210,7 @@ async def test_the_groups_have_tab_and_the_arrows() -> None:
         assert len(set(seen)) == 3
 
 
-async def test_simply_start_is_the_first_group_with_its_steps_in_their_order() -> None:
+async def test_simply_start_is_the_first_group_with_steps_in_order() -> None:
     async with bench("atv31") as made:
         screen = await to_parameters(made)
         lines = [line.strip() for line in shown(made.app, "groups").splitlines()]
@@ -236,7 +236,7 @@ async def test_simply_start_is_the_first_group_with_its_steps_in_their_order() -
         await until(made.pilot, lambda: "14 First run" in shown(made.app, "table"))
 
 
-async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:
+async def test_named_value_is_selected_and_word_edited_by_bits() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)
         await find(made, "STT")
@@ -251,7 +251,7 @@ async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:
         await made.pilot.press("enter", "escape")
 
 
-async def test_out_of_range_is_refused_while_it_is_typed() -> None:
+async def test_value_out_of_range_is_refused_while_typed() -> None:
     async with bench("atv312") as made:
         await to_parameters(made)
         await find(made, "HSP")
@@ -265,7 +265,7 @@ async def test_out_of_range_is_refused_while_it_is_typed() -> None:
         assert "0 staged" in shown(made.app, "status")
 
 
-async def test_steps_undo_all_and_selections() -> None:
+async def test_steps_undo_all_and_selections_edit_parameters() -> None:
     async with bench("atv312") as made:
         await to_parameters(made)
         await find(made, "HSP")
@@ -281,7 +281,7 @@ async def test_steps_undo_all_and_selections() -> None:
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
 
 
-async def test_stop_works_here_and_in_its_fields() -> None:
+async def test_stop_works_on_parameters_and_in_its_fields() -> None:
     async with bench("atv312") as made:
         await made.running()
         await to_parameters(made)
@@ -292,7 +292,7 @@ async def test_stop_works_here_and_in_its_fields() -> None:
         await made.stopped()
 
 
-async def test_leaving_with_staged_edits_asks() -> None:
+async def test_leaving_with_staged_edits_asks_first() -> None:
     async with bench("atv312") as made:
         await to_parameters(made)
         await find(made, "HSP")
@@ -308,7 +308,7 @@ async def test_leaving_with_staged_edits_asks() -> None:
         await until(made.pilot, lambda: "1 staged" in shown(made.app, "status"))
 
 
-async def test_back_up_change_compare_stage_and_write(
+async def test_backup_is_compared_staged_and_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -336,7 +336,7 @@ async def test_back_up_change_compare_stage_and_write(
         assert (made.drive().raw("ACC"), made.drive().raw("HSP")) == (30, 500)
 
 
-async def test_a_file_that_is_no_set_is_reported_and_nothing_is_staged(
+async def test_file_that_is_not_a_set_is_reported_and_stages_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -349,7 +349,7 @@ async def test_a_file_that_is_no_set_is_reported_and_nothing_is_staged(
         assert "0 staged" in shown(made.app, "status")
 
 
-async def test_a_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     async with bench("atv312") as made:
         await to_parameters(made)
@@ -358,7 +358,7 @@ async def test_a_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         assert "Altivar 312" in read(Path("pump.md"))
 
 
-async def test_the_panel_follows_a_drive_to_its_new_address() -> None:
+async def test_panel_follows_a_drive_to_its_new_address() -> None:
     async with bench("atv71") as made:
         await to_parameters(made)
         parameter = made.drive().profile.quantity("line_address")
@@ -384,7 +384,7 @@ def question(made: Bench) -> str:
 
 
 @pytest.mark.parametrize(("code", "dialog"), [("ACC", EditNumber), ("STT", PickValue)])
-async def test_a_stop_of_the_drive_ends_a_dialog_that_only_stages(code: str, dialog: type) -> None:
+async def test_stop_of_the_drive_closes_a_staging_dialog(code: str, dialog: type) -> None:
     async with bench("atv71") as made:
         await made.running()
         screen = await to_parameters(made)
@@ -397,7 +397,7 @@ async def test_a_stop_of_the_drive_ends_a_dialog_that_only_stages(code: str, dia
         assert len(screen.editor.staging.edits) == 0
 
 
-async def test_a_value_past_another_parameters_limit_is_refused_with_its_name() -> None:
+async def test_value_beyond_the_limit_of_another_parameter_is_refused() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)
         await find(made, "HSP")
@@ -413,7 +413,7 @@ async def test_a_value_past_another_parameters_limit_is_refused_with_its_name() 
 
 
 @pytest.mark.parametrize("key", kept(["y", "escape", "f12"], "y", "f12"))
-async def test_behind_a_failure_the_rest_needs_confirmation(key: str) -> None:
+async def test_remaining_edits_after_a_failure_need_confirmation(key: str) -> None:
     async with bench("atv71") as made:
         await made.running()
         screen = await to_parameters(made)
@@ -440,7 +440,7 @@ async def test_behind_a_failure_the_rest_needs_confirmation(key: str) -> None:
 
 
 @pytest.mark.parametrize(("stops_since", "dialog"), [(0, RestQuestion), (1, Results)])
-async def test_a_stop_since_the_writing_leaves_nothing_to_be_requested(
+async def test_stop_after_the_write_shows_results_without_a_question(
     stops_since: int, dialog: type
 ) -> None:
     """Whoever comes back to the screen after a stop reads what became of it, and no more."""
@@ -454,7 +454,7 @@ async def test_a_stop_since_the_writing_leaves_nothing_to_be_requested(
         await until(pilot, lambda: isinstance(app.screen, dialog))
 
 
-async def test_files_tell_their_drive_and_what_differs(
+async def test_files_show_their_drive_and_differences(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -483,7 +483,7 @@ async def test_files_tell_their_drive_and_what_differs(
         assert writes(made.app) == []
 
 
-async def test_a_search_looks_everywhere_and_goes_on_in_its_group() -> None:
+async def test_search_covers_all_groups_and_continues_in_the_found_one() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)
         await find(made, "RFR")  # no setting
@@ -494,7 +494,7 @@ async def test_a_search_looks_everywhere_and_goes_on_in_its_group() -> None:
         assert screen.listed.count > 1
 
 
-async def test_s_in_the_results_of_a_write_asks_to_save() -> None:
+async def test_s_in_write_results_asks_to_save() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)
         for code in ("ACC", "DEC"):

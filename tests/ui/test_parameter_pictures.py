@@ -339,7 +339,7 @@ def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
     assert snap_compare(app, terminal_size=size, run_before=show)
 
 
-def test_another_hands_value_is_reported_as_the_drive_counts_it() -> None:
+def test_foreign_value_is_shown_in_the_scale_of_the_drive() -> None:
     """An Altivar 31 without a ramp increment counts in tenths; that is not an unknown scale."""
     console = fakes.console_of(None, family="atv31")
     editor = still_editor(console, lambda: None)

@@ -92,7 +92,7 @@ def test_every_part_keeps_its_size_and_its_width(profile_id: str, data: st.DataO
 
 
 @given(width=st.integers(20, 220), height=st.integers(5, 80), count=st.integers(0, 20))
-def test_the_parts_fill_the_terminal_and_no_more(width: int, height: int, count: int) -> None:
+def test_parts_fill_the_terminal_exactly(width: int, height: int, count: int) -> None:
     room = arrange(width, height, count)
     rows = (room.top, room.values, room.trend, room.words, room.bottom)
     assert min(rows) >= 0
@@ -102,9 +102,7 @@ def test_the_parts_fill_the_terminal_and_no_more(width: int, height: int, count:
 
 @pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
 @pytest.mark.parametrize("profile_id", PROFILES)
-def test_the_parts_have_the_rows_that_they_are_given(
-    profile_id: str, size: tuple[int, int]
-) -> None:
+def test_parts_have_their_given_rows(profile_id: str, size: tuple[int, int]) -> None:
     profile = library.load(profile_id)
     room = room_of(profile, size)
     parts = monitor_parts(view_of(profile, {}), room, watched_words(profile))
@@ -119,7 +117,7 @@ def test_the_parts_have_the_rows_that_they_are_given(
 @pytest.mark.parametrize("profile_id", kept(PROFILES, "atv21", "atv71", "powerdrive"))
 @settings(max_examples=40)
 @given(data=st.data())
-def test_numbers_end_and_units_begin_at_one_place(profile_id: str, data: st.DataObject) -> None:
+def test_numbers_and_units_are_aligned(profile_id: str, data: st.DataObject) -> None:
     """Each column has its numbers to the right, and the units behind them."""
     profile = library.load(profile_id)
     room = room_of(profile, (80, 24))
@@ -134,7 +132,7 @@ def test_numbers_end_and_units_begin_at_one_place(profile_id: str, data: st.Data
                 assert not part.strip() or (part[end - 1] != " " and part[end] == " "), part
 
 
-def test_values_beside_monitor_are_read() -> None:
+def test_values_shown_beside_monitor_are_read() -> None:
     """Who commands and who gives the reference would stand as dashes."""
     for profile in map(library.load, PROFILES):
         channels = [profile.quantity("command_channel"), profile.quantity("reference_channel")]
@@ -146,7 +144,7 @@ def test_values_beside_monitor_are_read() -> None:
         assert wanted == set(codes_beside(profile))
 
 
-def test_large_digits_stand_at_one_place_whatever_their_value() -> None:
+def test_large_digits_are_aligned_whatever_their_value() -> None:
     profile = library.load("atv71")
     found = set()
     for raw in (0, 5, 500, 5999, -500):
@@ -163,7 +161,7 @@ def test_large_digits_stand_at_one_place_whatever_their_value() -> None:
     st.integers(4, 60),
     st.none() | st.floats(-1e4, 1e4),
 )
-def test_a_bar_has_its_width_whatever_its_value(
+def test_bar_has_its_width_whatever_its_value(
     value: float | None, low: float, high: float, width: int, mark: float | None
 ) -> None:
     drawn = gauge(value, low, high, width, mark)
@@ -171,7 +169,7 @@ def test_a_bar_has_its_width_whatever_its_value(
     assert drawn.plain.count("┃") == (mark is not None)
 
 
-def test_a_bar_is_filled_from_zero_to_either_side() -> None:
+def test_bar_is_filled_from_zero_to_either_side() -> None:
     forward, reverse = gauge(30, 0, 60, 22).plain, gauge(-30, -60, 60, 22).plain
     assert forward == "├━━━━━━━━━━──────────┤"
     assert reverse == "├─────━━━━━┼─────────┤"
@@ -182,14 +180,14 @@ def test_a_bar_is_filled_from_zero_to_either_side() -> None:
     st.integers(1, 12),
     st.booleans(),
 )
-def test_a_trend_has_its_size_whatever_its_values(
+def test_trend_has_its_size_whatever_its_values(
     points: list[float | None], height: int, signed: bool
 ) -> None:
     rows = trend_rows(points, points[::-1], 60.0, height, signed=signed)
     assert [row.cell_len for row in rows] == [len(points)] * height
 
 
-def test_a_trend_shows_the_sign_and_the_reference_as_a_line_of_its_own() -> None:
+def test_trend_shows_the_sign_and_a_line_for_the_reference() -> None:
     up = [row.plain for row in trend_rows([0, 30, 60], [60, 60, 60], 60, 2)]
     assert up == ["▔▔█", "▁██"]
     down = [row.plain for row in trend_rows([0, -60, None], [-60, -60, 30], 60, 2, signed=True)]
@@ -207,7 +205,7 @@ def keys_shown(screen: str, width: int, stops: str = "STOP") -> Text:
 
 @pytest.mark.parametrize("screen", EVERYWHERE)
 @given(width=st.integers(30, 200))
-def test_the_stop_comes_first_in_red_and_is_never_cut_off(screen: str, width: int) -> None:
+def test_stop_key_comes_first_in_red_and_is_never_cut(screen: str, width: int) -> None:
     line = keys_shown(screen, width)
     assert line.cell_len <= width
     assert line.plain.startswith(" Space STOP  ")
@@ -231,7 +229,7 @@ def test_no_key_is_dropped_at_80_columns(screen: str) -> None:
     note=st.sampled_from(["", "exception 2", "checksum wrong"]),
     width=st.integers(60, 200),
 )
-def test_a_frame_fits_its_line_and_keeps_its_note(data: bytes, note: str, width: int) -> None:
+def test_frame_fits_its_row_and_keeps_its_note(data: bytes, note: str, width: int) -> None:
     line = frame_line(Frame(0.0, "in", data, note), 3.0, 0.012, width)
     assert line.cell_len <= width
     assert line.plain.endswith(note)
@@ -252,7 +250,7 @@ def test_a_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:
 
 
 @pytest.mark.parametrize("family", [listing.id for listing in library.listings()])
-def test_no_value_is_shown_beside_the_readouts_and_in_them(family: str) -> None:
+def test_no_value_is_shown_twice(family: str) -> None:
     profile = library.load(family)
     readouts = [readout_parameter(profile, name) for name in ("output_frequency", "motor_current")]
     codes = {parameter.code for parameter in readouts if parameter is not None}

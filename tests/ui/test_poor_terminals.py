@@ -52,7 +52,7 @@ async def test_plain_signs_are_ascii_on_every_screen(
             assert [strip.text for strip in strips if not strip.text.isascii()] == []
 
 
-async def test_without_colors_there_is_none_on_any_screen(
+async def test_no_screen_has_colors_without_color_support(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     app, screen = panel(SCENES["fault"], monkeypatch, POOR["no colors"])

@@ -8,7 +8,7 @@ from .test_command_flows import bench
 from .test_flows import arm, shown, until
 
 
-async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
+async def test_p_asks_and_pauses_polling_until_the_drive_reacts() -> None:
     async with bench("atv312", sets={"ttO": 10}) as made:
         await made.pilot.press("6", "P")
         await until(made.pilot, lambda: "Not armed" in shown(made.app, "said"))
@@ -27,7 +27,7 @@ async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
         await until(made.pilot, lambda: "FAULT SLF" in shown(made.app, "strip"))
 
 
-async def test_without_visible_effect_says_so_and_sends_nothing() -> None:
+async def test_timeout_without_visible_effect_is_refused() -> None:
     async with bench("atv312", sets={"SLL": 0}) as made:
         await made.pilot.press("6")
         await arm(made.pilot)

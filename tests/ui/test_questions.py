@@ -87,7 +87,7 @@ class OpenQuestion:
         await until(pilot, lambda: self.question._drawn is not None)
 
 
-def test_the_moment_is_that_of_the_rules() -> None:
+def test_question_waits_the_moment_of_the_safety_rules() -> None:
     assert Question.SETTLED == MOMENT
 
 
@@ -108,7 +108,7 @@ YES: dict[str, tuple[Callable[[], Question[Any]], str, object]] = {
 
 @pytest.mark.usefixtures("slow_hands")
 @pytest.mark.parametrize("name", YES)
-async def test_a_key_that_comes_too_early_is_no_answer(name: str) -> None:
+async def test_early_key_does_not_answer(name: str) -> None:
     make, key, answer = YES[name]
     requested = OpenQuestion(make())
     async with requested.app.run_test(size=(80, 24)) as pilot:
@@ -133,7 +133,7 @@ async def test_a_key_that_comes_too_early_is_no_answer(name: str) -> None:
 
 @pytest.mark.usefixtures("slow_hands")
 @pytest.mark.parametrize(("key", "answer"), [("s", "stop"), ("escape", "stay"), ("q", "stay")])
-async def test_a_stop_and_a_no_count_at_once(key: str, answer: str) -> None:
+async def test_stop_and_no_apply_immediately(key: str, answer: str) -> None:
     requested = OpenQuestion(Leave("it runs"))
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
@@ -143,7 +143,7 @@ async def test_a_stop_and_a_no_count_at_once(key: str, answer: str) -> None:
 
 @pytest.mark.parametrize("key", ["escape", "q", "n"])
 @pytest.mark.parametrize("loses", [True, False])
-async def test_no_is_no_on_three_keys(key: str, loses: bool) -> None:
+async def test_three_keys_answer_no(key: str, loses: bool) -> None:
     requested = OpenQuestion(confirm(loses=loses))
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
@@ -183,12 +183,12 @@ async def test_typed_text_does_not_answer_a_new_question() -> None:
         ("tui/screens/parameters/write_keys.py", 1),
     ],
 )
-def test_questions_that_no_key_asks_for_come_by_themselves(place: str, calls: int) -> None:
+def test_questions_without_a_key_open_automatically(place: str, calls: int) -> None:
     assert Path(place).read_text().count("by_itself=True") == calls
     assert RestQuestion.by_itself
 
 
-async def test_enter_is_no_yes_where_something_is_lost_and_that_is_reported() -> None:
+async def test_enter_does_not_confirm_a_loss_and_says_so() -> None:
     requested = OpenQuestion(confirm())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
@@ -201,7 +201,7 @@ async def test_enter_is_no_yes_where_something_is_lost_and_that_is_reported() ->
     assert str(Confirm("", "", yes="goes", no="stays", loses=False)._keys).startswith("y or Enter")
 
 
-async def test_a_long_question_keeps_its_keys_in_sight_and_scrolls() -> None:
+async def test_long_question_scrolls_with_its_keys_visible() -> None:
     follows = "\n".join(f"line {number}" for number in range(40))
     requested = OpenQuestion(
         Confirm("Write?", follows, yes="writes", no="writes nothing", loses=True)
@@ -219,7 +219,7 @@ async def test_a_long_question_keeps_its_keys_in_sight_and_scrolls() -> None:
 # A stop of the drive ends the question
 
 
-async def test_a_voided_question_answers_no_and_takes_no_yes_any_more() -> None:
+async def test_cancelled_question_answers_no_and_accepts_no_yes() -> None:
     requested = OpenQuestion(confirm())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
@@ -238,7 +238,7 @@ async def test_a_voided_question_answers_no_and_takes_no_yes_any_more() -> None:
             assert requested.answers == [no]
 
 
-async def test_a_question_that_a_stop_ends_at_once_leaves_nothing_to_do() -> None:
+async def test_question_ended_by_a_stop_does_nothing() -> None:
     question = confirm()
     requested = OpenQuestion(question)
     async with requested.app.run_test(size=(80, 24)) as pilot:
@@ -252,7 +252,7 @@ def ask() -> Ask:
     return Ask("Reference", lambda _: "", number=True)
 
 
-async def test_a_question_below_another_screen_is_voided_when_it_comes_up() -> None:
+async def test_question_below_another_screen_is_cancelled_when_shown() -> None:
     requested = OpenQuestion(confirm())
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
@@ -305,7 +305,7 @@ def test_motor_state_is_shown_in_one_line() -> None:
     assert now_text(None) == "? state unknown"
 
 
-def test_unwatched_line_shows_state_from_its_checks() -> None:
+def test_unmonitored_drive_shows_the_state_of_its_checks() -> None:
     profile = library.load("atv71")
     state = fakes.snapshot_of(profile, fakes.RUNNING).state
     look = Look(state, "", fakes.NOW, None)
@@ -315,7 +315,7 @@ def test_unwatched_line_shows_state_from_its_checks() -> None:
     assert now_text(old, look).strip() == "▶ running forward"
 
 
-async def test_a_question_tells_what_the_motor_does_while_it_is_open() -> None:
+async def test_open_question_shows_the_motor_state() -> None:
     requested = OpenQuestion(confirm())
     profile = library.load("atv71")
     console = fakes.console_of(fakes.snapshot_of(profile, fakes.RUNNING))
@@ -447,7 +447,7 @@ FAMILY = {
 
 
 @pytest.mark.parametrize("name", kept(QUESTIONS, "write", "control", "coast"))
-async def test_nothing_is_written_on_any_key_but_y(name: str) -> None:
+async def test_only_y_writes(name: str) -> None:
     way, kind = QUESTIONS[name]
     async with bench(FAMILY.get(name, "atv71")) as made:
         for key in ("q", "n", "escape", "enter"):
@@ -478,7 +478,7 @@ async def back_to_monitor(made: Bench) -> None:
     await until(made.pilot, lambda: bool(shown(made.app, "state")))
 
 
-async def test_the_panel_is_not_left_past_a_question() -> None:
+async def test_panel_does_not_exit_during_a_question() -> None:
     async with bench("atv312") as made:
         await write_parameters(made)
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
@@ -500,9 +500,7 @@ async def test_the_panel_is_not_left_past_a_question() -> None:
 
 @pytest.mark.parametrize("motors", [1, 5])
 @pytest.mark.parametrize("size", [(80, 24), (120, 40)])
-async def test_the_keys_of_leaving_stand_below_however_much_is_reported(
-    size: tuple[int, int], motors: int
-) -> None:
+async def test_keys_of_leaving_are_always_at_the_bottom(size: tuple[int, int], motors: int) -> None:
     def runs() -> Text:
         return Text("\n".join(["Now  running forward"] * motors))
 
@@ -518,7 +516,7 @@ async def test_the_keys_of_leaving_stand_below_however_much_is_reported(
         assert requested.question.query_one("#says").max_scroll_y > 0
 
 
-async def test_enter_on_control_says_why_nothing_is_requested() -> None:
+async def test_enter_on_control_says_why_there_is_no_question() -> None:
     async with bench("atv71") as made:
         await made.pilot.press("6")
         await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))

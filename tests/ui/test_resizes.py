@@ -65,12 +65,12 @@ PLACES = [*SCREENS, *DIALOGS]
 
 
 @pytest.mark.parametrize("place", kept(PLACES, *PLACES[::6]))
-async def test_awkward_sizes_end_no_screen(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_screens_survive_awkward_sizes(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     await resizes(monkeypatch, [*AWKWARD, *random_sizes(3, PLACES.index(place))], place)
 
 
 @pytest.mark.sweep
 @pytest.mark.parametrize("place", PLACES)
-async def test_random_sizes_end_no_screen(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_screens_survive_random_sizes(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """1,000 sizes over all places."""
     await resizes(monkeypatch, random_sizes(1000 // len(PLACES) + 1, PLACES.index(place)), place)

@@ -58,16 +58,16 @@ def edited(line: RunLine, keys: str) -> str:
         ("123456789", "1234567"),
     ],
 )
-def test_the_first_digit_replaces_the_proposal_and_the_rest_edit(keys: str, text: str) -> None:
+def test_first_digit_replaces_the_suggestion_and_others_edit(keys: str, text: str) -> None:
     assert edited(LINE, keys) == text
 
 
 @pytest.mark.parametrize("character", ["x", " ", "-", "e", "[", "²", "٣"])
-def test_keys_no_number_has_are_ignored(character: str) -> None:
+def test_keys_that_are_not_in_a_number_are_ignored(character: str) -> None:
     assert LINE.typed(character) is None
 
 
-def test_steps_end_at_the_limits() -> None:
+def test_run_line_steps_end_at_the_limits() -> None:
     low, high = Decimal(20), Decimal(50)
     ends = {key: LINE.stepped(key, low, high).text for key in ARROWS}
     assert ends == {"up": "31.0", "down": "29.0", "pageup": "35.0", "pagedown": "25.0"}
@@ -80,7 +80,7 @@ def test_steps_end_at_the_limits() -> None:
     assert RunLine("reference", "900", "rpm", fakes.NOW, 0).stepped("up", None, None).text == "910"
 
 
-def test_the_last_reference_given_is_proposed_else_the_drives_own() -> None:
+def test_last_reference_given_is_suggested_else_that_of_the_drive() -> None:
     profile = library.load("atv71")
     held = {"LFR": -300}
     assert proposed(profile, "42.5 Hz", held) == ("42.5", "Hz")
@@ -91,7 +91,7 @@ def test_the_last_reference_given_is_proposed_else_the_drives_own() -> None:
     assert proposed(library.load("varmeca"), "", {}) == ("", "")
 
 
-def test_the_moment_is_that_of_the_rules() -> None:
+def test_run_line_waits_the_moment_of_the_safety_rules() -> None:
     assert SETTLED == MOMENT
 
 
@@ -111,7 +111,7 @@ def open_lines(made: Bench) -> Callable[[], bool]:
     return lambda: "Esc cancel" in output(made.app)
 
 
-async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_early_enter_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     async with ready() as made:
         monkeypatch.setattr(run_line, "ENTER_COUNTS_AFTER", SETTLED)
         clock = made.app.clock
@@ -132,7 +132,7 @@ async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPa
         await until(made.pilot, lambda: made.speed() > 2)
 
 
-async def test_from_arming_to_a_running_motor_in_five_keys() -> None:
+async def test_five_keys_lead_from_arming_to_a_running_motor() -> None:
     async with bench("atv71") as made:
         await made.armed()
         await made.pilot.press("r", "3", "0")
@@ -143,7 +143,7 @@ async def test_from_arming_to_a_running_motor_in_five_keys() -> None:
         assert made.drive().raw("LFR") == 300
 
 
-async def test_any_other_key_closes_the_line_and_is_swallowed() -> None:
+async def test_any_other_key_closes_the_run_line_and_is_ignored() -> None:
     async with ready() as made:
         screen, before = made.app.screen, time.monotonic()
         for keys in CLOSING:
@@ -160,7 +160,7 @@ async def test_any_other_key_closes_the_line_and_is_swallowed() -> None:
 
 
 @pytest.mark.parametrize("stop", kept(["space", "f12", "f9"], "space"))
-async def test_a_stop_closes_the_line_and_enter_comes_too_late(stop: str) -> None:
+async def test_stop_closes_the_run_line_and_a_later_enter_is_ignored(stop: str) -> None:
     async with ready() as made:
         for key, typed in itertools.product("rvf", ["", "4", "4."]):
             if not made.is_armed():
@@ -176,7 +176,7 @@ async def test_a_stop_closes_the_line_and_enter_comes_too_late(stop: str) -> Non
             await disarmed(made)
 
 
-async def test_the_end_of_arming_closes_the_line() -> None:
+async def test_end_of_arming_closes_the_run_line() -> None:
     async with ready() as made:
         before = writes(made.app)
         await made.pilot.press("r")
@@ -188,7 +188,7 @@ async def test_the_end_of_arming_closes_the_line() -> None:
         assert writes(made.app) == before
 
 
-async def test_arrows_edit_the_line_and_step_a_reference_without_one() -> None:
+async def test_arrows_edit_the_run_line_or_step_the_reference() -> None:
     async with ready() as made:
         await made.pilot.press("f", "up", "up", "pagedown", "backspace", "2", "7")
         await until(made.pilot, lambda: "REFERENCE at 27 Hz" in output(made.app))
@@ -200,7 +200,7 @@ async def test_arrows_edit_the_line_and_step_a_reference_without_one() -> None:
         await until(made.pilot, lambda: made.drive().raw("LFR") == 260)
 
 
-async def test_a_step_past_a_limit_goes_to_the_limit() -> None:
+async def test_step_beyond_a_limit_reaches_the_limit() -> None:
     async with ready() as made:
         made.drive().set("HSP", 330)
         made.drive().set("LSP", 280)
@@ -211,7 +211,7 @@ async def test_a_step_past_a_limit_goes_to_the_limit() -> None:
         await until(made.pilot, lambda: made.drive().raw("LFR") == 280)
 
 
-async def test_an_arrow_opens_the_line_where_it_would_start_the_motor() -> None:
+async def test_arrow_that_would_start_the_motor_opens_the_run_line() -> None:
     async with bench("atv71") as made:
         await made.armed()
         await made.refer("30")
@@ -231,7 +231,7 @@ async def test_an_arrow_opens_the_line_where_it_would_start_the_motor() -> None:
         await until(made.pilot, lambda: made.speed() > 0)
 
 
-async def test_a_drive_whose_reference_is_not_given_from_here_has_a_line_without_one() -> None:
+async def test_run_line_has_no_reference_if_another_source_gives_it() -> None:
     async with bench("varmeca") as made:
         await made.armed()
         await made.pilot.press("r")
@@ -242,7 +242,7 @@ async def test_a_drive_whose_reference_is_not_given_from_here_has_a_line_without
         await made.message("is not known")
 
 
-async def test_at_0_hz_r_says_so_and_takes_a_reference() -> None:
+async def test_r_at_0_hz_asks_for_a_reference() -> None:
     async with bench("atv71") as made:
         await made.armed()
         await made.pilot.press("r")
@@ -257,7 +257,7 @@ async def test_at_0_hz_r_says_so_and_takes_a_reference() -> None:
         await until(made.pilot, lambda: made.speed() > 2)
 
 
-async def test_the_line_says_before_enter_why_it_has_no_effect_and_what_opens_the_way() -> None:
+async def test_run_line_shows_why_it_has_no_effect_and_what_to_do() -> None:
     async with bench("atv71") as made:
         made.drive().set("FR1", 1)  # a terminal gives command and reference
         await made.armed()
@@ -271,7 +271,7 @@ async def test_the_line_says_before_enter_why_it_has_no_effect_and_what_opens_th
         assert writes(made.app) == before
 
 
-async def test_the_line_of_keys_shows_only_those_of_the_line() -> None:
+async def test_key_line_shows_only_run_line_keys() -> None:
     async with ready() as made:
         await made.pilot.press("r")
         await until(made.pilot, lambda: shown(made.app, "keys").split() == KEYS_OF_THE_LINE)

@@ -38,7 +38,7 @@ def typed(line: RunLine, text: str) -> RunLine | None:
     ("text", "stands"),
     [("2", "2"), ("45", "45"), ("7.5", "7.5"), ("7,5", "7.5"), (".5", "0.5"), ("1..5", "1.5")],
 )
-def test_the_first_digit_replaces_the_proposal(text: str, stands: str) -> None:
+def test_first_digit_replaces_the_suggestion(text: str, stands: str) -> None:
     found = typed(LINE, text)
     assert found is not None
     assert found.text == stands
@@ -46,11 +46,11 @@ def test_the_first_digit_replaces_the_proposal(text: str, stands: str) -> None:
 
 
 @pytest.mark.parametrize("character", ["a", " ", "-", "\r", "²", "٣", "h"])
-def test_keys_not_in_the_number_close_the_line(character: str) -> None:
+def test_keys_not_in_a_number_close_the_run_line(character: str) -> None:
     assert LINE.typed(character) is None
 
 
-def test_backspace_takes_the_proposal_whole_and_typed_digits_one_by_one() -> None:
+def test_backspace_clears_the_suggestion_or_one_typed_digit() -> None:
     assert LINE.erased().text == ""
     found = typed(LINE, "45")
     assert found is not None
@@ -69,14 +69,14 @@ def test_arrows_step_within_the_limits(key: str, ends: str) -> None:
 
 
 @given(st.text(alphabet="0123456789.,", max_size=30))
-def test_whatever_is_typed_is_short_and_has_one_point(text: str) -> None:
+def test_typed_number_is_short_and_has_one_point(text: str) -> None:
     found = typed(LINE, text)
     assert found is not None
     assert len(found.text) <= DIGITS_MOST
     assert found.text.count(".") <= 1
 
 
-def test_a_reference_past_the_limit_is_reported_and_not_given() -> None:
+def test_reference_beyond_the_limit_is_reported_and_not_given() -> None:
     profile = library.load("atv71")
     readings = fakes.readings_of(profile, {"HSP": 500, "LSP": 0, "TFR": 600}, fakes.NOW)
     wrong = RunLine("forward", "60", "Hz", 0.0, 0).checked(profile, readings)
@@ -87,7 +87,7 @@ def test_a_reference_past_the_limit_is_reported_and_not_given() -> None:
     assert "not a reference" in empty.fault
 
 
-def test_the_proposal_is_the_last_reference_given_else_the_drives_own() -> None:
+def test_suggestion_is_the_last_reference_else_that_of_the_drive() -> None:
     profile = library.load("atv71")
     assert proposed(profile, "37.5 Hz", {}) == ("37.5", "Hz")
     assert proposed(profile, "", {"LFR": 200}) == ("20.0", "Hz")
@@ -122,7 +122,7 @@ def test_run_line_has_the_unit_and_the_scale_of_the_reference(
 
 
 @pytest.mark.parametrize("width", [80, 120])
-def test_the_line_says_what_will_happen_and_fits(width: int) -> None:
+def test_run_line_says_what_will_happen_and_fits(width: int) -> None:
     profile = library.load("atv71")
     raws = {"HSP": 500, "LSP": 0, "TFR": 600, "ACC": 30, "INR": 1, "FRS": 500}
     readings = fakes.readings_of(profile, raws, fakes.NOW)
@@ -149,7 +149,7 @@ def test_the_line_says_what_will_happen_and_fits(width: int) -> None:
         ("forward", None, ""),
     ],
 )
-def test_how_long_it_takes_begins_at_what_the_motor_does(
+def test_ramp_time_starts_at_the_current_speed(
     purpose: Purpose, output: str | None, seconds: str
 ) -> None:
     """30 Hz at 3 s up and 5 s down for 50 Hz."""

@@ -51,7 +51,7 @@ def packets(path: Path) -> list[bytes]:
     return found
 
 
-def test_as_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
+def test_frames_are_saved_in_modbus_tcp_form(peer: Peer, tmp_path: Path) -> None:
     path = tmp_path / "new" / "frames.pcapng"
     assert save(path) == 2
     wanted = ("mbtcp.unit_id", "modbus.regval_uint16", "frame.time_epoch", "frame.comment")
@@ -66,13 +66,13 @@ def test_as_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
     ]
 
 
-def test_raw_as_it_was_on_the_line(tmp_path: Path) -> None:
+def test_frames_are_saved_raw(tmp_path: Path) -> None:
     path = tmp_path / "frames.raw.pcapng"
     assert save(path) == 3
     assert packets(path) == [REQUEST, b"\x00\x02", REPLY]
 
 
-def test_frames_of_modbus_tcp_have_one_form(tmp_path: Path) -> None:
+def test_modbus_tcp_frames_have_one_form(tmp_path: Path) -> None:
     head = bytes.fromhex("000100000006")
     frames = (Frame(1.0, "out", head + REQUEST[:-2]), Frame(1.1, "in", b"\x00"))
     for name in ("a.pcapng", "a.raw.pcapng"):
@@ -81,7 +81,7 @@ def test_frames_of_modbus_tcp_have_one_form(tmp_path: Path) -> None:
         assert packet[46:] == REQUEST[:-2]
 
 
-def test_as_text(tmp_path: Path) -> None:
+def test_frames_are_saved_as_text(tmp_path: Path) -> None:
     path = tmp_path / "frames.txt"
     assert save(path) == 3
     head, columns, *lines = path.read_text("utf-8").splitlines()
@@ -94,12 +94,12 @@ def test_as_text(tmp_path: Path) -> None:
     ]
 
 
-def test_a_note_is_text_and_commands_nothing() -> None:
+def test_note_does_not_control_terminal() -> None:
     frame = Frame(1.0, "in", b"\x00", "\x1b[2J")
     assert "␛[2J" in frames_text([frame], [0], [""], 0.0, [])
 
 
-def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
+def test_existing_file_is_kept(tmp_path: Path) -> None:
     for name in ("a.pcapng", "a.txt"):
         (tmp_path / name).write_bytes(b"mine")
         with pytest.raises(FileExistsError):

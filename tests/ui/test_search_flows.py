@@ -50,7 +50,7 @@ def output(app: DrivePanelApp) -> list[str]:
     return [event.text for event in app.events.events]
 
 
-async def test_a_drive_is_opened_while_the_search_for_others_goes_on() -> None:
+async def test_drive_is_opened_during_the_scan() -> None:
     async with panel(DriveSpec("atv71", 1), DriveSpec("atv71", 4)) as (app, pilot):
         await until(pilot, lambda: app.connection.drives.has_focus)
         search = app.connection.search
@@ -73,7 +73,7 @@ async def test_a_drive_is_opened_while_the_search_for_others_goes_on() -> None:
         assert not search.goes_on
 
 
-async def test_a_search_ends_with_its_line_and_says_nothing_of_it() -> None:
+async def test_scan_ends_silently_with_its_line() -> None:
     async with panel(DriveSpec("atv71", 1)) as (app, pilot):
         await until(pilot, lambda: bool(app.connection.found))
         search = app.connection.search
@@ -83,7 +83,7 @@ async def test_a_search_ends_with_its_line_and_says_nothing_of_it() -> None:
         assert "closed" not in " ".join(output(app))
 
 
-async def test_other_addresses_are_typed_in_place_and_remembered_for_the_line() -> None:
+async def test_typed_addresses_are_stored_for_the_line() -> None:
     async with panel(DriveSpec("atv71", 1), DriveSpec("atv71", 14)) as (app, pilot):
         await until(pilot, lambda: app.connection.drives.has_focus)
         await pilot.press("c", "1", "3", "-", "enter")
@@ -122,7 +122,7 @@ async def test_pending_timeout_is_reported_once() -> None:
         assert sum("Kept asking" in text for text in output(app)) == 1
 
 
-async def test_a_drive_whose_reaction_to_a_silent_line_is_off_does_not_act() -> None:
+async def test_drive_with_its_timeout_reaction_off_has_no_pending_timeout() -> None:
     ignoring = DriveSpec("atv31", 1, sets={"SLL": 0})
     async with panel(ignoring, DriveSpec("atv21", 2)) as (app, pilot):
         await until(pilot, lambda: any("Kept asking" in text for text in output(app)))
@@ -132,7 +132,7 @@ async def test_a_drive_whose_reaction_to_a_silent_line_is_off_does_not_act() -> 
         assert set(app.fleet.line_watch.left_alone()) <= {2}
 
 
-async def test_drive_whose_identification_comes_damaged_keeps_its_stop_keys() -> None:
+async def test_drive_with_damaged_identification_keeps_its_stop_keys() -> None:
     damaged = ScanResult(1, DriveIdentity(1, "", "", "", "", None, ()), "It came damaged.")
     other = replace(damaged, device=9, identity=DriveIdentity(9, "", "", "", "", None, ()))
     async with panel(DriveSpec("atv71", 1)) as (app, pilot):
@@ -149,7 +149,7 @@ async def test_drive_whose_identification_comes_damaged_keeps_its_stop_keys() ->
         assert "It came damaged. The address is taken." in output(app)
 
 
-async def test_swapped_bytes_are_shown_at_the_connection_and_on_monitor() -> None:
+async def test_swapped_bytes_are_shown_on_line_and_monitor() -> None:
     async with panel(DriveSpec("atv71", 1), faults=FaultRates(swapped=1.0)) as (app, pilot):
         await until(pilot, lambda: any("arrive swapped" in text for text in output(app)))
         await until(pilot, lambda: 1 in app.connection.found)

@@ -45,7 +45,7 @@ def turning(made: Panel) -> list[bool]:
     return found
 
 
-async def test_another_line_opens_beside_and_both_are_marked_and_can_be_shown() -> None:
+async def test_second_line_opens_beside_and_both_can_be_shown() -> None:
     async with two_lines() as made:
         app = made.app
         first, second = app.panel_lines
@@ -62,7 +62,7 @@ async def test_another_line_opens_beside_and_both_are_marked_and_can_be_shown() 
         )
 
 
-async def test_a_fault_of_a_line_that_is_not_shown_counts_and_is_reported_with_its_line() -> None:
+async def test_fault_on_a_hidden_line_is_counted_and_reported() -> None:
     async with two_lines() as made:
         simulation = made.app.panel_lines[0].opened.simulation
         assert simulation is not None
@@ -84,7 +84,7 @@ async def test_stop_all_stops_the_motors_of_every_line() -> None:
         await made.until(lambda: turning(made) == [False, False])
 
 
-async def test_a_stop_on_line_stops_the_motors_of_every_line() -> None:
+async def test_stop_on_line_stops_the_motors_of_every_line() -> None:
     async with two_lines() as made:
         await made.until(lambda: turning(made) == [True, True])
         assert made.app.stop_target_text == "STOP ALL"
@@ -92,7 +92,7 @@ async def test_a_stop_on_line_stops_the_motors_of_every_line() -> None:
         await made.until(lambda: turning(made) == [False, False])
 
 
-async def test_closing_one_shows_the_other_and_leaves_it_alone() -> None:
+async def test_closing_one_line_shows_the_other_unchanged() -> None:
     async with two_lines() as made:
         app = made.app
         first, second = app.panel_lines
@@ -104,7 +104,7 @@ async def test_closing_one_shows_the_other_and_leaves_it_alone() -> None:
         assert turning(made) == [True]
 
 
-async def test_leaving_tells_of_the_drives_of_both() -> None:
+async def test_leaving_reports_drives_of_both_lines() -> None:
     async with two_lines() as made:
         app = made.app
         for line in app.panel_lines:
@@ -120,7 +120,7 @@ async def test_leaving_tells_of_the_drives_of_both() -> None:
         assert "Altivar 312" in output
 
 
-async def test_the_same_line_with_other_settings_is_closed_only_after_asking() -> None:
+async def test_same_line_with_other_settings_is_closed_only_if_confirmed() -> None:
     async with two_lines() as made:
         app = made.app
         app.panel_lines[0].opened.text = "serial:/dev/ttyUSB7,19200,8N1"
@@ -131,7 +131,7 @@ async def test_the_same_line_with_other_settings_is_closed_only_after_asking() -
         assert len(app.panel_lines) == 2
 
 
-async def test_foreign_frames_are_reported_with_the_name_of_a_line_that_is_not_shown() -> None:
+async def test_foreign_frames_on_a_hidden_line_are_reported_with_its_name() -> None:
     async with two_lines() as made:
         below, shown = made.app.panel_lines
         for item in (below, shown):
@@ -151,7 +151,7 @@ async def test_foreign_frames_are_reported_with_the_name_of_a_line_that_is_not_s
         assert "1 Line ▲" in made.shown("tabs")
 
 
-async def test_a_line_that_is_lost_has_no_health() -> None:
+async def test_lost_line_has_no_health() -> None:
     async with two_lines() as made:
         shown = made.app.panel_lines[1]
         line, simulation = shown.opened.line, shown.opened.simulation

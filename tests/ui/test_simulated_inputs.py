@@ -24,7 +24,7 @@ async def requested(made: Bench) -> None:
     await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
 
 
-async def test_a_text_sets_the_inputs_of_the_drive_shown_and_writes_nothing() -> None:
+async def test_typed_text_sets_simulated_inputs_without_a_write() -> None:
     async with bench("atv312") as made:
         await requested(made)
         before = writes(made.app)
@@ -36,7 +36,7 @@ async def test_a_text_sets_the_inputs_of_the_drive_shown_and_writes_nothing() ->
         assert writes(made.app) == before
 
 
-async def test_a_wrong_text_is_reported_and_sets_nothing() -> None:
+async def test_invalid_text_is_reported_and_sets_nothing() -> None:
     async with bench("atv312") as made:
         await requested(made)
         await made.pilot.press(*"LI1=1,LI9=1", "enter")
@@ -47,7 +47,7 @@ async def test_a_wrong_text_is_reported_and_sets_nothing() -> None:
         assert made.drive().terminals.bits() == 0
 
 
-async def test_on_a_real_line_it_asks_nothing() -> None:
+async def test_input_key_does_nothing_on_a_real_line() -> None:
     async with bench("atv312") as made:
         await made.pilot.press("l")
         await until(made.pilot, lambda: NOT_SIMULATED[:40] in output(made.app))

@@ -32,7 +32,7 @@ from .test_flows import picture, shown, until
 
 
 @pytest.mark.parametrize("field", ["baud", "format", "addresses", "profile", "lines"])
-async def test_space_stops_where_a_space_is_no_text(field: str) -> None:
+async def test_space_stops_unless_it_is_text(field: str) -> None:
     app = app_of()
     async with app.run_test() as pilot:
         await until(pilot, lambda: bool(app.connection.query(f"#{field}")))
@@ -44,7 +44,7 @@ async def test_space_stops_where_a_space_is_no_text(field: str) -> None:
 
 
 @pytest.mark.parametrize("number", [True, False])
-async def test_space_stops_where_a_number_is_requested_and_is_text_in_a_name(number: bool) -> None:
+async def test_space_stops_in_number_fields_and_is_text_in_names(number: bool) -> None:
     app = app_of()
     async with app.run_test() as pilot:
         app.push_screen(Ask("Save to", str, number=number))
@@ -54,7 +54,7 @@ async def test_space_stops_where_a_number_is_requested_and_is_text_in_a_name(num
         assert (app.stop_stamp() != before) is number
 
 
-async def test_f12_and_f9_stop_in_every_field_and_nothing_else_does() -> None:
+async def test_only_f12_and_f9_stop_in_every_field() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         app.push_screen(Ask("Reference", str))
@@ -68,7 +68,7 @@ async def test_f12_and_f9_stop_in_every_field_and_nothing_else_does() -> None:
         assert app.stop_stamp() == stamps[-1]
 
 
-async def test_keys_that_were_not_taken_are_reported_without_markup() -> None:
+async def test_ignored_keys_are_reported_without_markup() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         app.ignored_keys_text(3)
@@ -83,7 +83,7 @@ async def test_keys_that_were_not_taken_are_reported_without_markup() -> None:
         assert not app._notifications, "a toast is for a motor that does not stop"
 
 
-async def test_key_state_is_known_while_it_applies() -> None:
+async def test_stroke_is_known_while_its_key_is_handled() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         seen: list[object] = []
@@ -101,7 +101,7 @@ def shown_text(app: DrivePanelApp) -> str:
     return app.focused.value
 
 
-async def test_a_paste_outside_of_a_text_is_reported_and_does_nothing() -> None:
+async def test_paste_outside_a_text_is_ignored_and_reported() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         await until(pilot, lambda: bool(app.connection.query("#lines")))
@@ -121,7 +121,7 @@ async def test_a_paste_outside_of_a_text_is_reported_and_does_nothing() -> None:
         assert [event.text for event in app.events.events] == texts
 
 
-async def test_space_is_text_again_once_a_key_that_may_leave_has_had_its_effect() -> None:
+async def test_space_is_text_again_after_a_pending_key_is_handled() -> None:
     app = app_of()
     async with app.run_test() as pilot:
         app.push_screen(Ask("Save to", lambda _: "not that"))
@@ -135,7 +135,7 @@ async def test_space_is_text_again_once_a_key_that_may_leave_has_had_its_effect(
         assert isinstance(app.focused, Input)
 
 
-async def test_a_stop_voids_a_key_that_is_on_its_way_through_the_screen(
+async def test_stop_cancels_a_key_in_processing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The screen may take seconds for it, where the terminal takes nothing."""
@@ -160,7 +160,7 @@ async def test_a_stop_voids_a_key_that_is_on_its_way_through_the_screen(
             assert done == expected
 
 
-async def test_a_first_f12_stops_before_it_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_first_f12_stops_before_it_is_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     app = app_of()
     stamps: list[object] = []
     monkeypatch.setattr(
@@ -174,7 +174,7 @@ async def test_a_first_f12_stops_before_it_is_noted(monkeypatch: pytest.MonkeyPa
         assert stamps
 
 
-async def test_a_stop_that_reaches_nobody_says_so() -> None:
+async def test_stop_that_reaches_no_drive_says_so() -> None:
     app = fakes.app_of()
     async with app.run_test(notifications=True) as pilot:
         assert app.take_stop_key("f9")
@@ -182,7 +182,7 @@ async def test_a_stop_that_reaches_nobody_says_so() -> None:
         assert [event.text for event in app.events.events] == [NOBODY_TO_STOP]
 
 
-async def test_a_stop_tells_of_a_device_that_nobody_knows_how_to_stop() -> None:
+async def test_stop_reports_a_device_without_a_known_stop() -> None:
     app = fakes.app_of()
     async with app.run_test(notifications=True) as pilot:
         app.opened = fakes.opened()
@@ -206,7 +206,7 @@ async def test_a_stop_tells_of_a_device_that_nobody_knows_how_to_stop() -> None:
 
 
 @pytest.mark.parametrize("passed", [(SharedState, "commander"), (Commander, "arm")])
-async def test_a_stop_while_the_key_that_arms_has_its_effect_is_the_last_word(
+async def test_stop_while_arming_leaves_the_drive_disarmed(
     monkeypatch: pytest.MonkeyPatch, passed: tuple[type, str]
 ) -> None:
     """The keys are read in a thread of their own: a stop may come at any place of that way."""
@@ -258,7 +258,7 @@ def waiting(app: DrivePanelApp) -> bool:
     )
 
 
-async def test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive(
+async def test_error_after_a_stop_key_does_not_prevent_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def failing(*_: object, **__: object) -> None:
@@ -284,7 +284,7 @@ async def test_an_error_behind_a_stop_key_keeps_no_frame_from_the_drive(
         assert not missing
 
 
-async def test_nothing_covers_that_a_motor_is_not_stopped() -> None:
+async def test_not_stopped_message_is_never_covered() -> None:
     """Armed, in a question and on each size: who runs it and where to stop it, to the last word."""
     reported = (
         "drive 1: run by its terminals (Fr1), not by Modbus. Stop it there or at the machine."

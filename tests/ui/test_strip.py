@@ -32,7 +32,7 @@ RUNS = DriveNow(
 VIEW = StripView(drive=RUNS, faults=1, unseen=True, load=0.4, clock="14:02:11")
 
 
-def test_the_strip_at_80_columns() -> None:
+def test_status_bar_fits_80_columns() -> None:
     line = strip_line(VIEW, 80)
     assert line.cell_len == 80
     for part in ("MACHINE 4", "▶ FORWARD", "30.0 →  40.0 Hz", "3.2 A", "■ 1 fault", "ARMED 56 s"):
@@ -53,7 +53,7 @@ def cells_before(text: str, part: str) -> int:
     faults=st.integers(0, 31),
     width=st.sampled_from([60, 72, 80, 100, 120, 200]),
 )
-def test_nothing_moves_when_a_value_changes(
+def test_value_changes_move_nothing(
     words: str,
     frequency: str,
     current: str,
@@ -89,7 +89,7 @@ FOREIGN = ("foreign frames", "foreign", "")
         (None, 1, " ■ 1 fault  ▲ line 91 % 14:02:11 "),
     ],
 )
-def test_a_trouble_of_the_line_takes_what_faults_and_arming_leave(
+def test_line_trouble_uses_the_space_left_by_faults_and_arming(
     drive: DriveNow | None, faults: int, shown: str
 ) -> None:
     view = VIEW._replace(drive=drive, faults=faults, trouble=POOR)
@@ -104,7 +104,7 @@ def test_a_trouble_of_the_line_takes_what_faults_and_arming_leave(
 @pytest.mark.parametrize("drive", [None, RUNS, RUNS._replace(armed=None)])
 @pytest.mark.parametrize("trouble", [POOR, FOREIGN])
 @pytest.mark.parametrize("width", [60, 72, 80, 120])
-def test_a_trouble_of_the_line_moves_nothing_else(
+def test_line_trouble_moves_nothing_else(
     drive: DriveNow | None, trouble: tuple[str, ...], width: int
 ) -> None:
     view = VIEW._replace(drive=drive, line="pump", faults=1 if drive is None else 0)
@@ -115,13 +115,13 @@ def test_a_trouble_of_the_line_moves_nothing_else(
             assert marked.rindex(part) == plain.rindex(part)
 
 
-def test_a_drive_that_is_not_heard_is_reported_by_its_age() -> None:
+def test_silent_drive_is_shown_with_its_age() -> None:
     line = strip_line(VIEW._replace(drive=RUNS._replace(age=12.0)), 80).plain
     assert "? 12s ago" in line
     assert "FORWARD" not in line
 
 
-def test_a_fault_that_was_looked_at_shouts_no_more() -> None:
+def test_acknowledged_fault_is_not_highlighted() -> None:
     def style_of(unseen: bool) -> object:
         line = strip_line(VIEW._replace(unseen=unseen), 80)
         at = line.plain.index("■")
@@ -131,13 +131,13 @@ def test_a_fault_that_was_looked_at_shouts_no_more() -> None:
     assert style_of(unseen=False) == FAULT
 
 
-def test_commander_of_drive_not_commanded_by_this_panel() -> None:
+def test_other_commander_of_the_drive_is_shown() -> None:
     for by in ("Terminals", "panel pts/12"):
         drive = RUNS._replace(armed=None, by=by)
         assert f"by {by}" in strip_line(StripView(drive=drive), 80).plain
 
 
-def test_without_a_drive_the_strip_tells_the_line() -> None:
+def test_status_bar_without_a_drive_shows_the_line() -> None:
     view = StripView(line="/dev/ttyUSB0 19200 8E1 · 31 drives", faults=2, load=0.74, clock="14:02")
     line = strip_line(view, 80).plain
     assert "31 drives" in line
@@ -145,7 +145,7 @@ def test_without_a_drive_the_strip_tells_the_line() -> None:
     assert "load  74 %" in line
 
 
-def test_a_long_name_of_a_line_hides_nothing_that_is_reported_it() -> None:
+def test_long_line_name_hides_no_note_about_the_line() -> None:
     path = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0 19200 8E1"
     view = StripView(line=f"{path} · only listened to", load=0.74, clock="14:02:11")
     reported = strip_line(view, 80).plain
@@ -167,14 +167,14 @@ def test_every_tab_has_its_key_and_fits(width: int, chosen: str) -> None:
     assert any(span.style == CURSOR for span in line.spans)
 
 
-def test_a_mark_moves_no_tab() -> None:
+def test_marks_move_no_tab() -> None:
     bare = tabs_line(TABS, MONITOR, {}, 80).plain
     marked = tabs_line(TABS, MONITOR, {"parameters": ("●2", ATTENTION)}, 80).plain
     assert bare.index("4 Scanner") == marked.index("4 Scanner")
 
 
 @pytest.mark.parametrize("kind", ["refused", "done"])
-def test_a_message_is_whole_at_first_and_one_line_later(kind: str) -> None:
+def test_message_is_complete_at_first_and_one_line_later(kind: str) -> None:
     text = "Not sent: 80.0 Hz is above the high speed HSP, 60.0 Hz. Raise HSP on Parameters first."
     new = message_lines(BarMessage("14:02:11", text, kind, 1.0), 80)
     later = message_lines(BarMessage("14:02:11", text, kind, 60.0), 80)
@@ -186,7 +186,7 @@ def test_a_message_is_whole_at_first_and_one_line_later(kind: str) -> None:
 
 @pytest.mark.parametrize("width", [60, 80])
 @pytest.mark.parametrize("family", BY_TERMINALS)
-def test_failed_reset_is_shown_whole(family: str, width: int) -> None:
+def test_failed_reset_is_shown_completely(family: str, width: int) -> None:
     for why in (not_in_command(library.load(family), BY_TERMINALS[family]), STILL_IN_FAULT):
         text = f"Fault reset: {why}"
         lines = message_lines(BarMessage("14:02:11", text, "done", 1.0), width)
@@ -195,15 +195,13 @@ def test_failed_reset_is_shown_whole(family: str, width: int) -> None:
 
 
 @given(st.text(max_size=200), st.integers(1, 120))
-def test_a_text_is_cut_at_a_word(text: str, width: int) -> None:
+def test_text_is_cut_at_a_word(text: str, width: int) -> None:
     assert len(cut_at_word(text, width)) <= max(width, 1)
 
 
 @pytest.mark.parametrize("width", [60, 72, 80, 120])
 @pytest.mark.parametrize("faults", [0, 3])
-def test_a_journal_that_cannot_be_written_stands_there_and_moves_nothing(
-    width: int, faults: int
-) -> None:
+def test_unwritable_journal_is_shown_and_moves_nothing(width: int, faults: int) -> None:
     before = strip_line(StripView(drive=RUNS), width).plain
     line = strip_line(StripView(drive=RUNS, faults=faults, off_record=True), width)
     assert line.cell_len == width

@@ -50,7 +50,7 @@ async def two_looks(
         await made.message(code, "1 count is" if text == second[1] else "another value")
 
 
-async def test_two_looks_on_monitor_and_a_third_that_disagrees() -> None:
+async def test_two_readings_set_the_scale_and_a_disagreeing_third_discards_it() -> None:
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot
         assert "Output ?" in shown(app, "readouts")
@@ -78,7 +78,7 @@ async def test_invalid_display_number_is_reported_in_question() -> None:
         await made.pilot.press("escape")
 
 
-async def test_space_stops_while_a_display_is_typed() -> None:
+async def test_space_stops_while_a_display_value_is_typed() -> None:
     async with bench("powerdrive") as made:
         await pick(made, "5.01")
         await made.pilot.press("5", "space")
@@ -92,7 +92,7 @@ async def test_space_stops_while_a_display_is_typed() -> None:
         assert console.teacher.looks("5.01") == ()
 
 
-async def test_enter_on_a_raw_value_of_parameters_asks_and_l_does_too() -> None:
+async def test_enter_or_l_on_a_raw_value_asks_for_the_display_value() -> None:
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot
         for key, raw, text in (("enter", 84, "8.4A"), ("L", 120, "12.0")):
@@ -111,7 +111,7 @@ async def test_enter_on_a_raw_value_of_parameters_asks_and_l_does_too() -> None:
         await until(pilot, lambda: "12.0 A" in shown(app, "table"))
 
 
-async def test_l_on_a_parameter_with_a_scale_says_that_there_is_nothing_to_teach() -> None:
+async def test_l_on_a_scaled_parameter_says_that_its_scale_is_known() -> None:
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot
         await app.open_parameter("15.07")
@@ -124,7 +124,7 @@ async def test_l_on_a_parameter_with_a_scale_says_that_there_is_nothing_to_teach
         assert not isinstance(app.screen, Ask)
 
 
-async def test_a_taught_preset_is_proposed_confirmed_and_run_by() -> None:
+async def test_learned_preset_is_suggested_confirmed_and_used_to_run() -> None:
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot
         await pilot.press("R")
@@ -159,7 +159,7 @@ async def test_a_taught_preset_is_proposed_confirmed_and_run_by() -> None:
         await made.message("takes the reference no longer")
 
 
-async def test_a_family_with_a_reference_has_none_to_teach() -> None:
+async def test_family_with_a_reference_has_no_preset_to_learn() -> None:
     async with bench("atv71") as made:
         await made.pilot.press("R")
         await made.message("no reference that has to be taught")

@@ -230,13 +230,13 @@ async def test_markup_in_every_field_is_text(name: str) -> None:
         assert made.app._exception is None
 
 
-def test_every_field_that_asks_is_one_of_these() -> None:
+def test_every_question_field_is_tested() -> None:
     assert len(list(calls_of("Ask"))) == len(QUESTION_CLASSES), (
         "a new question: type markup into it here too"
     )
 
 
-async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written() -> None:
+async def test_texts_of_dialogs_notices_and_lists_are_shown_literally() -> None:
     app = fakes.app_of()
     async with app.run_test(size=(80, 24), notifications=True) as pilot:
         for text in (*MARKUP, NAME):
@@ -271,7 +271,7 @@ def picture(app: DrivePanelApp) -> str:
     return "\n".join(strip.text for strip in lines)
 
 
-def test_a_cell_never_holds_a_command() -> None:
+def test_cell_never_has_control_characters() -> None:
     from rich.color import ColorSystem
     from rich.segment import Segment
     from textual.strip import Strip
@@ -298,7 +298,7 @@ def panel() -> None:
 
 
 @pytest.mark.skipif(not hasattr(pty, "fork"), reason="no pseudo-terminals here")
-def test_a_drives_name_reaches_the_terminal_as_signs_only() -> None:
+def test_drive_name_does_not_control_terminal() -> None:
     process, terminal = pty.fork()
     if process == 0:
         code = "from tests.ui.test_text_is_text import panel; panel()"

@@ -51,7 +51,7 @@ def demo(*_: object, **__: object) -> OpenLine:
     return demo_line({id: hertz for id, (_, hertz) in demo_drives().items()})
 
 
-def test_the_tour_has_its_steps() -> None:
+def test_tour_has_its_steps() -> None:
     reported = steps()
     assert len(reported) >= 24
     assert ["ctrl+u", "3", "full_stop", "5"] in [keys for keys, _ in reported]
@@ -59,7 +59,9 @@ def test_the_tour_has_its_steps() -> None:
 
 
 @pytest.mark.sweep  # what it shows is tested screen by screen
-async def test_the_tour(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+async def test_tour_keys_show_what_the_page_says(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
     monkeypatch.chdir(tmp_path)
     app = DrivePanelApp(open_line=demo, start="demo")

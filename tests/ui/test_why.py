@@ -52,7 +52,7 @@ async def reported(app: DrivePanelApp, pilot: Pilot[None], words: str) -> str:
     return shown(app, "reasons")
 
 
-async def test_on_line_it_is_requested_by_the_address_and_the_profile_of_the_form(
+async def test_why_on_line_uses_address_and_profile_of_the_form(
     nobody: PtyPeer,
 ) -> None:
     async with on_line(nobody.path) as (app, pilot):
@@ -72,7 +72,7 @@ async def test_on_line_it_is_requested_by_the_address_and_the_profile_of_the_for
         await until(pilot, lambda: app.screen is app.connection)
 
 
-async def test_a_line_that_could_not_be_opened_tells_why(tmp_path: Path) -> None:
+async def test_why_explains_a_line_that_could_not_be_opened(tmp_path: Path) -> None:
     path = str(tmp_path / "ttyUSB4")
     async with on_line(f"serial:{path}") as (app, pilot):
         await until(pilot, lambda: app.connection.refused is not None)
@@ -81,7 +81,7 @@ async def test_a_line_that_could_not_be_opened_tells_why(tmp_path: Path) -> None
         assert "dmesg" in text
 
 
-async def test_a_line_that_is_not_open_is_not_opened_for_it(nobody: PtyPeer) -> None:
+async def test_why_does_not_open_a_closed_line(nobody: PtyPeer) -> None:
     app = DrivePanelApp(open_line=open_line)
     async with app.run_test(size=(80, 24)) as pilot:
         app.connection.lines.offer(nobody.path)
@@ -92,7 +92,7 @@ async def test_a_line_that_is_not_open_is_not_opened_for_it(nobody: PtyPeer) -> 
         assert nobody.requests == []
 
 
-async def test_on_monitor_it_is_the_open_drive() -> None:
+async def test_why_on_monitor_is_about_the_open_drive() -> None:
     async with panel() as made:
         await reported(made.app, made.pilot, "Address 1 answers")
         await made.pilot.press("space")
@@ -115,7 +115,7 @@ def test_every_line_fits(family: str, width: int) -> None:
     assert all(step.rstrip(".").split()[-1] in joined for step in silence(family).steps)
 
 
-def test_it_is_found_by_its_words() -> None:
+def test_why_is_found_in_the_palette() -> None:
     for query in ("why", "no answer", "diagnose"):
         assert "why" in [action.action.id for action in find(query, "line")][:2], query
 

@@ -30,7 +30,7 @@ async def wiring(made: Panel) -> WiringScreen:
     return screen
 
 
-async def test_the_page_of_the_open_drive_with_its_model() -> None:
+async def test_page_of_the_open_drive_has_its_model() -> None:
     async with panel() as made:
         await wiring(made)
         assert "Schneider Electric Altivar 71" in made.shown("title")
@@ -40,7 +40,7 @@ async def test_the_page_of_the_open_drive_with_its_model() -> None:
         await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
 
 
-async def test_verdict_of_n_is_the_first_section_until_the_drive_is_well(
+async def test_diagnosis_is_the_first_section_until_the_drive_answers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     measure = Measure(requested=40, answered=30, lost=10, seconds=2.0)
@@ -68,7 +68,7 @@ async def test_verdict_of_n_is_the_first_section_until_the_drive_is_well(
 
 
 @pytest.mark.sweep
-async def test_sections_and_lines_are_scrolled_and_the_end_is_the_end() -> None:
+async def test_scrolling_by_sections_and_lines_stops_at_the_end() -> None:
     async with panel() as made:
         screen = await wiring(made)
         first = made.shown("page").splitlines()[0]
@@ -90,7 +90,7 @@ async def test_sections_and_lines_are_scrolled_and_the_end_is_the_end() -> None:
         assert made.shown("page").splitlines()[0] == first
 
 
-async def test_the_next_drive_has_its_own_page() -> None:
+async def test_next_drive_has_its_own_page() -> None:
     async with panel() as made:
         await made.until(lambda: made.app.fleet is not None)
         await made.pilot.press("1")
@@ -108,7 +108,7 @@ async def test_the_next_drive_has_its_own_page() -> None:
         await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
 
 
-async def test_on_line_it_is_the_drive_under_the_cursor() -> None:
+async def test_page_on_line_is_that_of_the_selected_drive() -> None:
     async with panel() as made:
         await made.pilot.press("1", "s")
         await made.until(lambda: len(made.app.fleet.consoles if made.app.fleet else []) == 2)
@@ -125,13 +125,13 @@ async def test_on_line_it_is_the_drive_under_the_cursor() -> None:
         await made.until(lambda: made.app.screen is screen)
 
 
-async def test_a_stop_works_there_and_nothing_is_written() -> None:
+async def test_stop_works_on_wiring_and_nothing_is_written() -> None:
     async with panel() as made:
         await wiring(made)
         await made.pilot.press("space")
         await made.until(lambda: "STOPPING" in made.shown("strip"))
 
 
-def test_it_is_found_by_its_words() -> None:
+def test_wiring_is_found_in_the_palette() -> None:
     for query in ("wiring", "pins", "errata", "warnings"):
         assert find(query, "monitor")[0].action.id == "wiring", query
