@@ -232,22 +232,40 @@ def test_space_behind_a_key_that_leaves_a_text_stops(
 ) -> None:
     panel = fresh_panel
     panel.run()
-    panel.type("3")
-    panel.shows("/ search")
-    panel.type("/")
-    panel.settle(0.5)
+    name_of_file(panel)
     before = len(panel.log.writes)
     panel.type(*pieces, apart=apart)
     wait_until(lambda: panel.look() and panel.stops(before) > 0, "the stop")
     at_rest(panel)
 
 
-def test_space_is_text_in_a_text(fresh_panel: PtyPanel) -> None:
+def name_of_file(panel: PtyPanel) -> None:
+    """Open the question for the name of a file, in which a space is text."""
+    panel.type("7")
+    panel.shows("frames, j find")
+    panel.type("\x13")
+    panel.shows("Save the frames")
+    panel.settle(0.5)
+
+
+def test_space_stops_in_a_search(fresh_panel: PtyPanel) -> None:
     panel = fresh_panel
+    panel.run()
     panel.type("3")
     panel.shows("/ search")
     panel.type("/")
     panel.settle(0.5)
+    panel.type("of-a")
+    panel.shows("of-a", "Space STOP 1")
+    before = len(panel.log.writes)
+    panel.type(" ")
+    wait_until(lambda: panel.look() and panel.stops(before) > 0, "the stop")
+    at_rest(panel)
+
+
+def test_space_is_text_in_a_text(fresh_panel: PtyPanel) -> None:
+    panel = fresh_panel
+    name_of_file(panel)
     panel.type("of a")
     panel.shows("of a", "F12 STOP 1")
     assert "Space STOP" not in panel.text()

@@ -203,7 +203,7 @@ async def test_only_its_own_keys_affect_a_dialog(monkeypatch: pytest.MonkeyPatch
         assert stopped == []
 
 
-LETTERS = re.compile(r"(?:^|  )([^ ]) ")
+LETTERS = re.compile(r"(?:^|  )([^ -]) ")
 """A key of one letter in a line of keys."""
 
 

@@ -104,7 +104,7 @@ async def typed(made: Bench, query: str) -> OptionList:
     """Open the palette and type."""
     await made.pilot.press("ctrl+p")
     await until(made.pilot, lambda: isinstance(made.app.screen, Palette))
-    await made.pilot.press(*("space" if character == " " else character for character in query))
+    await made.pilot.press(*("minus" if character == " " else character for character in query))
     await made.pilot.pause()
     return made.app.screen.query_one(OptionList)
 

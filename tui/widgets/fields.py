@@ -1,12 +1,18 @@
-"""Fields to type into: a text unchanged, and numbers in which Space is not a character."""
+"""Fields to type into: texts, and numbers and filters, in which Space is not a character."""
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+import re
+from typing import Any, ClassVar, Final
 
 from textual.widgets import Input
 
 from .plain import Signs
+
+JOINS_KEY = "-", "joins words"
+"""The key that a person types between two words of a filter, and what it does."""
+_JOINS: Final = re.compile(r"(?<=[^\W\d_])-(?=\w|$)|(?<=\w)-(?=[^\W\d_])")
+"""A hyphen behind or before a letter. That of a number, as in -10 or 2-5, stays."""
 
 
 class Field(Input):
@@ -32,3 +38,12 @@ class NumberInput(Field):
     def check_consume_key(self, key: str, character: str | None) -> bool:
         """Space is left to the stop."""
         return key != "space" and super().check_consume_key(key, character)
+
+
+class FilterField(NumberInput):
+    """A field that filters a list while one types: Space stops the motor here too."""
+
+    @property
+    def words(self) -> str:
+        """The text with spaces for the hyphens that join words: `top-speed` is `top speed`."""
+        return _JOINS.sub(" ", self.value)

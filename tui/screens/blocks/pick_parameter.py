@@ -14,7 +14,7 @@ from tui.drive.blocks.picking import choices
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.widgets.drawing import cut
-from tui.widgets.fields import Field
+from tui.widgets.fields import JOINS_KEY, FilterField
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
@@ -23,7 +23,7 @@ from ..dialogs.question import Question, hint
 LISTED_MOST = 100
 """Parameters that are listed at once; a search brings the others."""
 NAME_WIDTH = 30
-PICK_HINT = hint(("Up, Down", "choose"), ("Enter", "propose"), ("Esc", "cancel"))
+PICK_HINT = hint(("Up, Down", "choose"), JOINS_KEY, ("Enter", "propose"), ("Esc", "cancel"))
 
 
 class PickParameter(Question[str | None]):
@@ -43,7 +43,7 @@ class PickParameter(Question[str | None]):
         """A search, and what it finds."""
         with Vertical(id="dialog"):
             yield Plain(f"{self._slot} is mapped to", id="question")
-            yield Field(placeholder="code, number, address or name", id="search")
+            yield FilterField(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
             yield Plain(PICK_HINT, id="hint")
@@ -54,9 +54,9 @@ class PickParameter(Question[str | None]):
         options.can_focus = False
         self._list("")
 
-    def on_input_changed(self, event: Input.Changed) -> None:
+    def on_input_changed(self) -> None:
         """Fewer, as more is typed."""
-        self._list(event.value)
+        self._list(self.query_one(FilterField).words)
 
     def _list(self, search: str) -> None:
         every = choices(self._profile, self._block, search)

@@ -8,11 +8,11 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
-from textual.widgets import Input, OptionList
+from textual.widgets import OptionList
 
 from tui.screens.keys.finding import FoundAction, find
 from tui.widgets.drawing import cut
-from tui.widgets.fields import Field
+from tui.widgets.fields import JOINS_KEY, FilterField
 from tui.widgets.palette import FAINT, KEY, PLAIN
 from tui.widgets.plain import Plain, entry
 
@@ -45,7 +45,9 @@ class Palette(Question[FoundAction | None]):
         """A field, and what fits what is typed there."""
         with Vertical(id="dialog"):
             yield Plain("Find an action", id="question")
-            yield Field(placeholder="Type a word, for example eeprom, ramp, frames", id="search")
+            yield FilterField(
+                placeholder="Type a word, for example eeprom, ramp, frames", id="search"
+            )
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
             yield Plain("", id="hint")
@@ -55,9 +57,9 @@ class Palette(Question[FoundAction | None]):
         self.query_one(OptionList).can_focus = False
         self._list("")
 
-    def on_input_changed(self, event: Input.Changed) -> None:
+    def on_input_changed(self) -> None:
         """Less, as more is typed."""
-        self._list(event.value)
+        self._list(self.query_one(FilterField).words)
 
     def _list(self, query: str) -> None:
         self._found = find(query, self._of)
@@ -97,6 +99,7 @@ class Palette(Question[FoundAction | None]):
         """Show the effect of Enter."""
         at = self.query_one(OptionList).highlighted
         keys = [("Up, Down", "choose")] if self._found else []
+        keys.append(JOINS_KEY)
         if at is not None:
             found = self._found[at]
             keys.append(("Enter", "run" if found.here else f"go to {found.screen.capitalize()}"))

@@ -14,7 +14,7 @@ from tui.bus.api import Frame
 from tui.bus.link import Link, TcpLink, label
 from tui.drive.profile.profile import Profile
 from tui.widgets.drawing import rule
-from tui.widgets.fields import Field
+from tui.widgets.fields import JOINS_KEY, FilterField
 from tui.widgets.lines import Lines
 from tui.widgets.plain import Plain
 
@@ -78,7 +78,7 @@ class FrameListScreen(PanelScreen):
         yield Lines(id="frames")
         with Horizontal(id="wanted"):
             yield Plain("", id="which")
-            yield Field(id="typed")
+            yield FilterField(id="typed")
 
     def on_mount(self) -> None:
         """Nothing is asked for yet."""
@@ -220,8 +220,8 @@ class FrameListScreen(PanelScreen):
     def typing_keys(self) -> Sequence[tuple[str, str]]:
         """Those of the filter, or of what is looked for."""
         if self._asking == "find":
-            return ("Enter", "older one"), ("Esc", "end")
-        return ("Enter", "keep"), ("Esc", "all frames")
+            return ("Enter", "older one"), JOINS_KEY, ("Esc", "end")
+        return ("Enter", "keep"), JOINS_KEY, ("Esc", "all frames")
 
     def _end_asking(self) -> None:
         self._asking = ""
@@ -229,19 +229,24 @@ class FrameListScreen(PanelScreen):
         self.query_one("#wanted").display = False
         self.call_after_refresh(self.look)
 
-    def on_input_changed(self, event: Input.Changed) -> None:
+    @property
+    def _wanted(self) -> str:
+        """The typed words."""
+        return self.query_one(FilterField).words
+
+    def on_input_changed(self) -> None:
         """Apply a typed filter at once."""
         if self._asking == "filter":
-            self._filter = " ".join(event.value.split())
+            self._filter = " ".join(self._wanted.split())
             self._up = 0
             self.look()
 
-    def on_input_submitted(self, event: Input.Submitted) -> None:
+    def on_input_submitted(self) -> None:
         """Keep the filter; or the next older frame that fits."""
         if self._asking == "filter":
             self._end_asking()
-        elif event.value.strip():
-            self._find(event.value)
+        elif wanted := self._wanted.strip():
+            self._find(wanted)
 
     def _find(self, text: str) -> None:
         if self._held is None:

@@ -207,7 +207,7 @@ class MonitorScreen(InputKeys):
         now = PERIODS.index(min(PERIODS, key=lambda p: abs(p - self.app.period)))
         self.app.period = PERIODS[max(0, min(len(PERIODS) - 1, now - step))]
         self.console.monitor.period = self.app.period
-        self.app.tell(f"The drive is asked {1 / self.app.period:.1f} times a second.")
+        self.app.tell(f"The drive is polled {1 / self.app.period:.1f} times a second.")
         self.look()
 
     def action_trend_window(self, step: int) -> None:

@@ -22,7 +22,7 @@ from tui.screens.parameters.group_view import FILTER_LABELS, group_lines
 from tui.screens.parameters.parameter_list import shows_steps
 from tui.screens.parameters.start_up_view import step_help
 from tui.screens.parameters.table_view import head_line, row_line
-from tui.widgets.fields import Field
+from tui.widgets.fields import JOINS_KEY, FilterField
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, KEY
 from tui.widgets.plain import Plain
@@ -52,7 +52,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             with Vertical(id="left"):
                 with Horizontal(id="find"):
                     yield Plain(Text(" / ", KEY), id="slash")
-                    yield Field(placeholder="search", id="search")
+                    yield FilterField(placeholder="search", id="search")
                 yield Lines(id="groups")
             with Vertical(id="right"):
                 yield Lines(id="columns")
@@ -163,7 +163,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
         """Those of the search."""
-        return ("Enter", "to the list"), ("Esc", "clear")
+        return ("Enter", "to the list"), JOINS_KEY, ("Esc", "clear")
 
     def on_input_changed(self) -> None:
         """Search as one types; the best match is chosen."""
