@@ -38,7 +38,7 @@ def test_lost_replies_are_reported_and_exit_with_1() -> None:
         (found,) = reported["differences"]
         assert found["kind"] == "not-answered"
         assert found["count"] >= 1
-        assert found["text"].startswith("The drive saw ")
+        assert found["text"].startswith("The drive received ")
         own = reported["last_minute"]["device"]
         assert own["lost"] + own["silent"] >= 1
         assert own["share"] < 1.0

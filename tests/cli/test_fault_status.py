@@ -80,7 +80,7 @@ async def test_fault_has_causes_checks_and_live_values() -> None:
         "check: Increase DEC; ",
         "(general practice)",
         "look at: DEC 0.5 s, the active ramp",
-        "reset: a fault reset works now, says the drive. ",
+        "reset: a fault reset works now, as the drive reports. ",
     ):
         assert part in text
 
@@ -90,7 +90,7 @@ async def test_drive_reports_that_the_cause_is_still_present() -> None:
         provoke(opened, "ObF", persists=True)
         status = await status_of(opened, "atv312")
     assert reported_of(status)["fault"]["reset"]["possible_now"] is False
-    assert "reset: Not yet, says the drive" in text_of(status)
+    assert "reset: Not yet: the drive reports" in text_of(status)
 
 
 async def test_fault_that_needs_a_wait_before_the_reset_says_so() -> None:

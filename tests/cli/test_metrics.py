@@ -54,7 +54,7 @@ def test_bad_reading_has_no_value(why: str) -> None:
         drive = drive_of(failed(good, "No answer."))
     else:
         drive = drive_of(good, now=NOW + 60)
-        assert "not asked for 60 s" in drive.error
+        assert "not polled for 60 s" in drive.error
     seen = text_of(line_of(drive))
     assert "drivepanel_value_hertz" not in seen
     assert "drivepanel_word" not in seen

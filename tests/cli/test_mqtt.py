@@ -74,7 +74,7 @@ def test_line_is_one_level_of_a_topic() -> None:
     assert level("serial:/dev/ttyUSB0,19200,8E1") == "serial:_dev_ttyUSB0,19200,8E1"
     assert level("a+b#c d\x00") == "a_b_c_d"
     assert level("/") == "_"
-    with pytest.raises(ValueError, match="give them names"):
+    with pytest.raises(ValueError, match="give them different names"):
         line_topics("plant", ["/dev/a", "dev/a"])
 
 
@@ -93,15 +93,15 @@ def test_url_selects_the_broker() -> None:
 @pytest.mark.parametrize(
     ("url", "reported"),
     [
-        ("broker", "write mqtt://"),
-        ("http://broker", "write mqtt://"),
-        ("mqtt://", "write mqtt://"),
-        ("mqtt://h:99999", "write mqtt://"),
-        ("mqtt://h/?retain=0", "write mqtt://"),
-        ("mqtt://h/a/+/b", "can be no topic"),
-        ("mqtt://h/a//b", "can be no topic"),
-        ("mqtt://h/$SYS", "can be no topic"),
-        ("mqtt://me:secret@h", "seen by every user"),
+        ("broker", "use mqtt://"),
+        ("http://broker", "use mqtt://"),
+        ("mqtt://", "use mqtt://"),
+        ("mqtt://h:99999", "use mqtt://"),
+        ("mqtt://h/?retain=0", "use mqtt://"),
+        ("mqtt://h/a/+/b", "is not a topic"),
+        ("mqtt://h/a//b", "is not a topic"),
+        ("mqtt://h/$SYS", "is not a topic"),
+        ("mqtt://me:secret@h", "Every user of this computer"),
     ],
 )
 def test_invalid_broker_is_refused(url: str, reported: str) -> None:
@@ -216,9 +216,9 @@ async def test_everything_is_retained_again_after_a_lost_connection(
     await task
     assert clients.made[3].retained["plant/status"] == "offline"
     output = capsys.readouterr().err
-    assert output.count("It is tried on.") == 2
+    assert output.count("Retrying.") == 2
     assert output.count("is connected again.") == 2
-    assert ": Connection refused. It is tried on." in output
+    assert ": Connection refused. Retrying." in output
     assert "Errno" not in output
 
 

@@ -94,7 +94,7 @@ REFUSED = {
     ),
     "run, no number": Refused("atv71", (*RUN, "--reference", "fast"), "is not a reference"),
     "run, scale not known": Refused(
-        MIXER, (*RUN, "--reference", "20Hz"), "its scale follows MODE", sets={"MODE": 9}
+        MIXER, (*RUN, "--reference", "20Hz"), "its scale depends on MODE", sets={"MODE": 9}
     ),
     "run, another scale": Refused("atv71", RUN, "Bit 9 of CMI is set", sets={"CMI": 0x0200}),
     "reference, another scale": Refused(
@@ -113,12 +113,12 @@ REFUSED = {
     "write above a limit": Refused("atv71", ("write", "LSP=60", "--arm"), "above HSP"),
     "write, a command": Refused("atv71", ("write", "CMD=6", "--arm"), "is a command"),
     "write, motor runs": Refused(
-        "atv312", ("write", "FrS=60", "--arm"), "motor stopped only", run_hz=20.0
+        "atv312", ("write", "FrS=60", "--arm"), "with the motor stopped", run_hz=20.0
     ),
     "write, read-only": Refused("atv71", ("write", "ACC=5", "--arm", "--read-only"), "read-only"),
     "block, not armed": Refused("atv71", ("block", "set", "NMA3=LCR"), "Not armed"),
     "block, motor runs": Refused(
-        "atv71", ("block", "set", "NMA3=LCR", "--arm"), "motor stopped only", run_hz=20.0
+        "atv71", ("block", "set", "NMA3=LCR", "--arm"), "with the motor stopped", run_hz=20.0
     ),
     "prove, not armed": Refused("atv71", ("prove",), "Not armed"),
     "prove, motor runs": Refused("atv71", ("prove", "--arm"), "", run_hz=20.0),

@@ -80,7 +80,7 @@ async def bench(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bench]:
 async def test_absent_drive_does_not_delay_others(
     bench: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert bench.sight(HERE).error == "Device 1 was not asked yet."
+    assert bench.sight(HERE).error == "Device 1 was not polled yet."
     assert bench.sight(HERE).contact == "not_polled"
     await wait_for(lambda: bench.good(HERE) and bench.good(OTHER))
     assert bench.changes
@@ -92,7 +92,7 @@ async def test_absent_drive_does_not_delay_others(
     await wait_for(lambda: "name its profile" in bench.sight(NAMELESS).error)
     output = capsys.readouterr().err
     assert output.count("Device 9 did not answer") == 1
-    assert output.count("It is tried on.") == 2
+    assert output.count("Retrying.") == 2
 
 
 async def test_drive_never_polled_is_polled_before_an_absent_one(
@@ -120,8 +120,8 @@ async def test_full_line_is_reported_once(
     task.cancel()
     lines = [line for line in capsys.readouterr().err.splitlines() if "fan" in line]
     assert lines == [
-        "drivepanel: fan: a cycle takes up to 5.8 s: the line is full.",
-        "drivepanel: fan: the cycle time is kept again.",
+        "drivepanel: fan: the line is full. A cycle takes up to 5.8 s.",
+        "drivepanel: fan: the cycle time is as requested again.",
     ]
 
 

@@ -115,7 +115,7 @@ def test_drive_with_line_timeout_is_named_before_first_request() -> None:
     with drives() as peer:
         done = invoked("scan", peer.path, "--addresses", "1-2", "--json")
     assert documents(done.stdout)[0]["event"] == "families"
-    assert "watch the line" in done.stderr.splitlines()[0]
+    assert "start their communication timeout" in done.stderr.splitlines()[0]
     (reported,) = events(done.stdout, "families")
     assert {"profile": "atv21", "name": "Altivar 21", "timeout": "F803", "sure": True} in reported[
         "families"
@@ -144,7 +144,7 @@ def test_another_master_ends_the_scan_before_anything_is_sent(options: tuple[str
     assert done.exit_code == 5
     # whichever was heard first
     assert "Address 6: " in done.stderr
-    assert "read of register 3201 on, 4 words" in done.stderr
+    assert "read of register 3201 to 3204" in done.stderr
     assert "write of register 8501" in done.stderr
     assert "Nothing was sent." in done.stderr
 
@@ -161,7 +161,7 @@ def test_later_master_ends_the_scan_and_keeps_the_hits() -> None:
     with simulation, PtyPeer(script) as peer:
         done = invoked("scan", peer.path, "--addresses", "1-20", "--json")
     assert done.exit_code == 3
-    assert "Address 40: read of register 3201 on, 4 words" in done.stderr
+    assert "Address 40: read of register 3201 to 3204" in done.stderr
     (end,) = events(done.stdout, "ended")
     assert (end["done"], end["found"]) == (False, 1)
     assert "1 drive found at addresses 1-20, not all of which were asked" in end["text"]

@@ -31,7 +31,7 @@ from .commands import refused
         (["sim:atv71", "--tcp", "localhost"], "write HOST:PORT"),
         (["sim:atv71", "--tcp", ":1", "-d", "1"], "both, or none"),
         (["sim:atv71", "--tcp", ":1", "-d", "1", "-p", "atv99"], "atv99"),
-        (["sim:atv71", "--tcp", ":1", "--allow-writes", " "], "Name codes"),
+        (["sim:atv71", "--tcp", ":1", "--allow-writes", " "], "Use codes"),
         (["sim:atv71", "sim:atv31", "--tcp", ":1"], "Several lines have the same ids"),
         (["sim:atv71", "--tcp", ":1", "--map", "1=2"], "there is no line 2"),
         (["sim:atv71", "sim:atv71"], "named twice"),
@@ -52,7 +52,7 @@ def test_port_in_use_is_reported() -> None:
         reported = refused(3, "serve", "sim:atv71", "--tcp", place)
         assert f"Nothing can be served at {place}: Address already in use." in reported
         reported = refused(3, "serve", "sim:atv71", "--metrics", place)
-        assert f"No metrics can be served at {place}: Address already in use." in reported
+        assert f"Metrics cannot be served at {place}: Address already in use." in reported
 
 
 def test_line_without_a_keeper_is_reported(
@@ -126,7 +126,7 @@ def test_drives_are_read_with_their_profiles() -> None:
         (1, None),
         (2, "powerdrive"),
     ]
-    assert "Write bare@1,2" in refused(2, "serve", "pump", "bare", "--metrics", ":1")
+    assert "Use bare@1,2" in refused(2, "serve", "pump", "bare", "--metrics", ":1")
     (simulated,) = served_lines(["sim:atv71@1,atv31@4"])
     assert [drive.device for drive in read_drives(simulated, (1, 4))] == [1, 4]
 

@@ -202,7 +202,10 @@ def test_line_settings_are_not_compared_with_the_factory() -> None:
         assert re.search(r"Add .* 5 .*line setting", every)
 
 
-ROUNDED = [("LSP=0.04", "LSP: 0.04 would be held as 0.0 Hz"), ("ACC=3.55s", "3.55s would be held")]
+ROUNDED = [
+    ("LSP=0.04", "LSP: 0.04 would be rounded to 0.0 Hz"),
+    ("ACC=3.55s", "3.55s would be rounded"),
+]
 
 
 @pytest.mark.parametrize(("wanted", "text"), ROUNDED)
@@ -218,7 +221,7 @@ def test_value_changed_much_by_rounding_exits_with_5(line: str, wanted: str, tex
 
 def test_slightly_rounded_value_is_written_and_reported(line: str) -> None:
     reported = run(0, "write", line, "-d", "2", "ACC=3.56", "--arm")
-    assert "3.56 is held as 3.6 s" in reported
+    assert "3.56 is rounded to 3.6 s" in reported
 
 
 def test_repeated_code_exits_with_2(line: str) -> None:
@@ -239,8 +242,8 @@ def test_rounding_of_a_set_is_reported(line: str, tmp_path: Path) -> None:
     planned = run(0, "restore", line, file, "-d", "2", "--dry-run")
     assert "leave  ACC" in planned
     reported = run(0, "restore", line, file, "-d", "2", "--arm")
-    assert "3.55 s is held as 3.6 s. Use --round to write it anyway" in reported
-    assert "3.56 s is held as 3.6 s" in reported
+    assert "3.55 s is rounded to 3.6 s. Use --round to write it anyway" in reported
+    assert "3.56 s is rounded to 3.6 s" in reported
     assert "Wrote 1, all verified" in reported
     assert "write  ACC" in run(0, "restore", line, file, "-d", "2", "--dry-run", "--round")
 
@@ -326,7 +329,7 @@ def test_unarmed_restore_writes_nothing_exits_with_5(tmp_path: Path) -> None:
 def test_restore_to_a_running_motor_exits_with_6() -> None:
     with tcp_line("atv312", "--run", "30") as line:
         output = refused(6, "write", line, "ACC=4", "FrS=60", "--arm")
-        assert "motor stopped only" in output
+        assert "with the motor stopped" in output
         assert "1 to write" not in output
         assert re.search(r"ACC .* 4\.0 +s ", run(0, "read", line, "ACC"))
 

@@ -36,7 +36,7 @@ def preset_taught(line: str) -> None:
 
 def test_two_readings_teach_the_scale_and_mark_values(line: str) -> None:
     assert teach(line) == "Nothing is taught.\n"
-    assert "Look again at another value" in teach(line, "1.21", "900 rpm")
+    assert "Enter another value of the display" in teach(line, "1.21", "900 rpm")
     assert "taught" not in run(0, "read", line, *DRIVE, "1.21")
     put(line, PRESET, 600)
     reported = teach(line, "1.21", "600")
@@ -89,7 +89,7 @@ def test_disagreeing_reading_exits_with_1(line: str) -> None:
     preset_taught(line)
     teach(line, "1.21", "--reference")
     output = teach(line, "1.21", "61.5", status=1)
-    assert "no longer taught (1 count is 1 rpm before)" in output
+    assert "Before: 1 count is 1 rpm" in output
     assert teach(line) == "Nothing is taught.\n"
     assert "No available manual" in refused(5, "reference", line, *DRIVE, "600rpm", "--arm")
 
@@ -106,11 +106,11 @@ def test_forget_removes_the_learned_scale(line: str) -> None:
         (2, ("NOSUCH", "1"), "no parameter"),
         (2, ("--forget",), "Which CODE?"),
         (2, ("1.21", "5", "--forget"), "Either"),
-        (5, ("10.40", "3"), "no scale to teach"),
-        (5, ("15.07", "3"), "nothing is to be taught"),
-        (5, ("1.21", "fast"), "not a number of a display"),
-        (5, ("5.01", "--reference"), "1.21 may"),
-        (5, ("1.21", "--reference"), "not taught yet"),
+        (5, ("10.40", "3"), "no scale that can be learned"),
+        (5, ("15.07", "3"), "is already known"),
+        (5, ("1.21", "fast"), "not a displayed value"),
+        (5, ("5.01", "--reference"), "Use 1.21"),
+        (5, ("1.21", "--reference"), "not learned yet"),
     ],
 )
 def test_invalid_teach_arguments_are_refused(

@@ -14,7 +14,7 @@ FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "va
 @pytest.mark.parametrize("family", FAMILIES)
 def test_wiring_page_of_a_family_has_its_sections(family: str) -> None:
     text = run(0, "profiles", family, "--wiring")
-    for part in ("Warnings", "Before it is opened", "Pins: ", "Addresses", "Command words"):
+    for part in ("Warnings", "Before you open the drive", "Pins: ", "Addresses", "Command words"):
         assert f"\n{part}" in text
     assert max(map(len, text.splitlines())) <= 100
 
@@ -23,7 +23,7 @@ def test_wiring_page_is_printed_as_json() -> None:
     reported = json.loads(run(0, "profiles", "atv71", "--wiring", "--json"))
     assert (reported["id"], reported["name"]) == ("atv71", "Altivar 71")
     titles = [section["title"] for section in reported["sections"]]
-    assert titles[:2] == ["Warnings", "Before it is opened"]
+    assert titles[:2] == ["Warnings", "Before you open the drive"]
     rows = {row["head"]: row["text"] for s in reported["sections"] for row in s["rows"]}
     assert rows["D0"].startswith("EIA/TIA-485: A or A'")
     assert rows["16#000F"] == "Enable operation, forward"
@@ -42,7 +42,7 @@ def run_usage(*arguments: str) -> str:
 
 @pytest.mark.parametrize(
     ("code", "text"),
-    [(6, "ATV21HU15M3X, 200 V, 1.5 kW"), (999, "code 999, in no list at hand")],
+    [(6, "ATV21HU15M3X, 200 V, 1.5 kW"), (999, "code 999, not in the profile")],
 )
 def test_model_is_read_from_the_drive(code: int, text: str) -> None:
     with tcp_line("atv21@3", "--set", f"FB05={code}", "--set", "FB72=0") as line:

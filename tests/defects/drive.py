@@ -186,7 +186,7 @@ DEFECTS = (
     Defect(
         "unread-interlock-passes",
         "tui/drive/command_blocked.py",
-        'return CommandBlocked(f"{lock.parameter} is not known, and it decides: {lock.text}")',
+        'return CommandBlocked(f"{lock.parameter} was not read, and may block this: {lock.text}")',
         "return None",
         "A motor starts although the word that forbids it could not be read.",
         ("tests/drive/test_orders.py",),

@@ -50,7 +50,7 @@ def test_example_profile_is_found_loaded_and_decodes(folder: Path) -> None:
     ramp = profile.find("40201")
     assert encode(ramp, "3 s", {}, Decimal(ramp.scale)).raw == ramp.factory == 300
     assert save_order(profile).parameter == "KEEP"
-    with pytest.raises(MemoryRefused, match="Example pump drive recalls"):
+    with pytest.raises(MemoryRefused, match="Example pump drive restores"):
         factory_order(profile)
     assert library.matching_profiles("EXPUMP-22") == ["example-pump"]
 
@@ -72,7 +72,7 @@ def test_own_profile_replaces_a_packaged_one(folder: Path) -> None:
 BROKEN = [
     # what is written, what it becomes, what the person is told
     ('scale = "0.1"', 'scale = "a tenth"', "FREQ"),
-    ("address = 101", "address = 100", "already that of STAT"),
+    ("address = 101", "address = 100", "already belongs to STAT"),
     ('source = "guide 5.2"', 'source = "a book"', "does not begin with the id of a source"),
     ('parameter = "TRIP", rate', 'parameter = "TRIPP", rate', "no parameter 'TRIPP'"),
     ('parameter = "KEEP"', 'parameter = "KEPT"', "no parameter 'KEPT'"),

@@ -121,7 +121,8 @@ def test_unread_word_that_decides_blocks_a_start(family: str, code: str) -> None
     found = command_channel(profile, raws)
     assert found is not None
     assert found.by_line is None
-    assert held(profile, raws) == f"{code} is not known, and it decides who commands the drive."
+    says = "which selects the source of the drive's commands, was not read."
+    assert held(profile, raws) == f"{code}, {says}"
 
 
 @pytest.mark.parametrize(

@@ -27,7 +27,7 @@ def test_typed_value_is_staged_and_rounding_reported() -> None:
     (edit,) = edits
     assert (edit.old, edit.new, edit.old_text, edit.text) == (30, 31, "3.0 s", "3.1 s")
     assert edit.rounded
-    assert edit.remark == "ACC: 3.14 s is held as 3.1 s."
+    assert edit.remark == "ACC: 3.14 s is rounded to 3.1 s."
     assert edits.after(HELD)["ACC"] == 31
     assert HELD["ACC"] == 30
 
@@ -138,7 +138,8 @@ def test_value_beyond_another_parameter_is_reported_with_both() -> None:
     edits = Edits().stage(ATV71, "LSP", "55", HELD)
     reported = edit_problems(ATV71, edits, HELD)
     assert reported == {
-        "LSP": "LSP = 55.0 Hz would be above HSP = 50.0 Hz: change HSP too, or another value."
+        "LSP": "LSP = 55.0 Hz would be above HSP = 50.0 Hz. Change HSP as well,"
+        " or use another value."
     }
     assert edit_problems(ATV71, edits.stage(ATV71, "HSP", "60", HELD), HELD) == {}
     lowered = Edits().stage(ATV71, "TFR", "40", HELD)
@@ -154,8 +155,8 @@ def test_edits_are_updated_if_the_drive_already_has_the_value() -> None:
 
 def test_disabling_the_timeout_has_a_warning() -> None:
     edits = Edits().stage(ATV21, "F803", "0", {"F803": 3})
-    assert "watch" in edits.items[0].warning
-    assert "watch" in edits.items[0].remark
+    assert "timeout" in edits.items[0].warning
+    assert "timeout" in edits.items[0].remark
 
 
 def test_settings_that_end_the_connection_are_known() -> None:

@@ -19,13 +19,13 @@ LEROY = ["powerdrive", "proxidrive", "varmeca"]
 FAMILIES = [*ALTIVAR, *LEROY]
 COMMON_SECTIONS = [
     "Warnings",
-    "Before it is opened",
+    "Before you open the drive",
     "Line",
     "Addresses",
-    "When the line falls silent",
+    "On a communication loss",
     "After a fault reset",
     "Command words",
-    "Where the manuals are wrong",
+    "Errors in the manuals",
 ]
 
 
@@ -51,7 +51,7 @@ def test_every_family_has_its_sections(family: str) -> None:
     titles = [section.title for section in family_page(library.load(family))]
     assert [title for title in COMMON_SECTIONS if title not in titles] == []
     assert [title for title in titles if title.startswith("Pins: ")]
-    assert ("Names of the signals" in titles) is (family in ALTIVAR)
+    assert ("Signal names" in titles) is (family in ALTIVAR)
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -103,7 +103,7 @@ def test_fact_from_another_manual_is_marked() -> None:
     assert gateway == "sister family ?"
     (own,) = [row.sure for row in section("atv71", "Warnings").rows if "gateway" in row.text]
     assert own == ""
-    wait = section("atv31", "Before it is opened").rows[0]
+    wait = section("atv31", "Before you open the drive").rows[0]
     assert (wait.text, wait.sure) == (
         "15 minutes; DC bus below 42 V, measured",
         "sister family ?",
@@ -114,20 +114,20 @@ WAITS = {
     "atv21": "15 minutes; DC bus below 45 V, measured",
     "atv312": "15 minutes; DC bus below 42 V, measured",
     "atv71": "15 minutes; DC bus below 45 V, measured",
-    "powerdrive": "not known",
-    "proxidrive": "not known",
-    "varmeca": "not known",
+    "powerdrive": "unknown",
+    "proxidrive": "unknown",
+    "varmeca": "unknown",
 }
 
 
 @pytest.mark.parametrize("family", WAITS)
 def test_page_has_the_wait_before_opening_the_drive(family: str) -> None:
-    assert section(family, "Before it is opened").rows[0].text == WAITS[family]
+    assert section(family, "Before you open the drive").rows[0].text == WAITS[family]
 
 
 @pytest.mark.parametrize("family", ALTIVAR)
 def test_page_has_signal_names_of_several_standards(family: str) -> None:
-    rows = {row.head: row.text for row in section(family, "Names of the signals").rows}
+    rows = {row.head: row.text for row in section(family, "Signal names").rows}
     assert rows == {
         "D0": "EIA/TIA-485: A or A'; Uni-Telway: D(A); Jbus: RD+/TD+ or L+",
         "D1": "EIA/TIA-485: B or B'; Uni-Telway: D(B); Jbus: RD-/TD- or L-",
@@ -139,7 +139,7 @@ def test_page_of_altivar_71_has_other_servers_and_lamps() -> None:
     addresses = text_of("atv71", "Addresses")
     assert "AMOA another server" in addresses
     assert "AMOC another server" in addresses
-    assert "leaves the factory with OFF" in addresses
+    assert "factory setting OFF" in addresses
     assert "MOD Lit for 200 ms" in text_of("atv71", "Lamps and display")
 
 
@@ -189,7 +189,7 @@ def test_model_names_are_shortened() -> None:
     assert model_read(profile, {"FB05": 136, "FB72": 0x80}) == (
         "ATV21W075N4C, 400/460 V, 0.75 kW, IP54, class B filter"
     )
-    assert model_read(profile, {"FB05": 999, "FB72": 0}) == "code 999, in no list at hand"
+    assert model_read(profile, {"FB05": 999, "FB72": 0}) == "code 999, not in the profile"
     assert model_read(profile, {}) == ""
     assert model_read(library.load("atv312"), {"FB05": 6}) == ""
 
@@ -197,5 +197,5 @@ def test_model_names_are_shortened() -> None:
 def test_section_without_rows_is_omitted() -> None:
     data = msgspec.structs.replace(library.load("atv71").data, errata=[], line_rules=[])
     titles = [section.title for section in family_page(Profile(data))]
-    assert "Where the manuals are wrong" not in titles
+    assert "Errors in the manuals" not in titles
     assert all(replace(section).rows for section in family_page(Profile(data)))

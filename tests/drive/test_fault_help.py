@@ -85,7 +85,7 @@ BROKEN = {
     "two": (GOOD + GOOD, "there are two"),
     "no such parameter": (
         GOOD + 'look_at = [{ code = "NOSUCH", why = "x" }]\n',
-        "there is no parameter 'NOSUCH' to look at",
+        "look_at: there is no parameter 'NOSUCH'",
     ),
     "no such bit": (
         '[[alarms]]\nword = "ETI"\nbit = 3\nprobable = ["x"]\n',
@@ -151,7 +151,7 @@ def test_drive_overrides_the_general_advice() -> None:
     assert reset_ready(profile, {"ETI": 0x0004}) is True
     assert reset_ready(profile, {"ETI": 0xFFFB}) is False
     assert reset_ready(library.load("atv21"), {"FD01": 0xFFFF}) is None
-    assert "x does nothing" in reset_text(help_, None, "x").text
+    assert "x has no effect" in reset_text(help_, None, "x").text
     assert "works now" in reset_text(help_, True, "x").text
     assert reset_text(help_, False, "x").text.startswith("Not yet")
 
@@ -163,7 +163,7 @@ def test_reset_text_always_warns_of_a_motor_that_may_start() -> None:
             assert reset_text(help_, ready, "x").text.endswith(MAY_START)
             assert reset_text(help_, ready, "x", "It may.").text.endswith("It may.")
     by_itself = FaultHelp(raw=1, probable=["x"], reset="by-itself")
-    assert "may start it." in reset_text(by_itself, None, "x").text
+    assert "may start." in reset_text(by_itself, None, "x").text
 
 
 def test_ways_of_reset_match_the_sources() -> None:

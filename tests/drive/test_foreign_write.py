@@ -111,7 +111,7 @@ def test_allow_all_excludes_control_and_line_settings() -> None:
     assert refusal("ACC", "ACC", "DEC") == ""
     assert "not allowed" in refusal("ACC", "DEC")
     assert "not allowed" in refusal("ACC")
-    assert "by its name only" in refusal("CHCF", ALL)
+    assert "`all` does not allow" in refusal("CHCF", ALL)
     assert refusal("CHCF", "CHCF") == ""
 
 

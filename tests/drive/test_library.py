@@ -67,12 +67,12 @@ def test_small_profile_loads(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line", "words"),
     [
-        ('unit = "Hz"', 'unit = "Hz"\ncolor = "red"', 29, "no field `color`"),
+        ('unit = "Hz"', 'unit = "Hz"\ncolor = "red"', 29, "`color` is not a field"),
         ("address = 100", 'address = "100"', 27, "must be of type int, not str"),
         ("address = 100", "address = 70000", 27, "must be <= 65535"),
         ('scale = "0.1"', 'scale = "0,1"', 29, "wrong form"),
-        ('scale = "0.1"', 'scale = "0.0"', 29, "scale is 0"),
-        ('access = "r"', 'access = "x"', 30, "none of the values allowed"),
+        ('scale = "0.1"', 'scale = "0.0"', 29, "scale must not be 0"),
+        ('access = "r"', 'access = "x"', 30, "not an allowed value"),
         ('source = "manual 1"', 'source = "web"', 32, "does not begin with the id of a source"),
         ('{ parameter = "FRQ" }', '{ parameter = "CUR" }', 21, "no parameter 'CUR'"),
         ("code = 3\n", "code = 6\n", 15, "function 3 is missing"),
@@ -99,7 +99,7 @@ def test_profile_error_is_reported_with_file_and_line(
 
 def test_two_parameters_with_one_address_are_refused(tmp_path: Path) -> None:
     again = SMALL[SMALL.index("[[parameters]]") :].replace("FRQ", "FR2")
-    with pytest.raises(ProfileError, match="address 100 is already that of FRQ"):
+    with pytest.raises(ProfileError, match="address 100 already belongs to FRQ"):
         library.load_file(write(tmp_path, SMALL + "\n" + again))
 
 

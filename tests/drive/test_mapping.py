@@ -317,7 +317,7 @@ GOOD = dump_blocks(ATV21, [factory(ATV21, block("atv21", "read"))])
     ("old", "new", "line", "says"),
     [
         ('F876 = "none"', 'F876 = "FA00"', 7, "cannot hold"),
-        ('F876 = "none"', "F876 = 12", 7, "none of the 11 choices"),
+        ('F876 = "none"', "F876 = 12", 7, "not one of the 11 choices"),
         ('F876 = "none"', "F876 = 1.5", 7, "neither a code nor a number"),
         ('F876 = "none"', 'F999 = "none"', 7, "not a slot"),
         ('F876 = "none"\n', "", 5, "F876 is missing"),

@@ -46,7 +46,7 @@ def test_unread_word_blocks_every_moving_command(family: str) -> None:
     for chart, lock in interlocks(family):
         raws = {c: raw for c, raw in words_of(chart, lock).items() if c != lock.parameter}
         for id in lock.orders or MOVING_ORDERS:
-            assert "is not known, and it decides" in refusal(
+            assert "was not read, and may block this" in refusal(
                 library.load(family), chart, id, raws
             ), (
                 id,

@@ -102,13 +102,13 @@ def test_hand_edited_value_counts_if_raw_is_removed() -> None:
     assert read(with_scale).raws["INR"] == 0
     assert read(small().replace('raw = 30, value = "3.0 s"', "value = 4.5")).raws["ACC"] == 45
     rounded = read(small().replace('raw = 30, value = "3.0 s"', 'value = "4.56 s"'))
-    assert (rounded.raws["ACC"], rounded.notes) == (46, {"ACC": "ACC: 4.56 s is held as 4.6 s."})
+    assert (rounded.raws["ACC"], rounded.notes) == (46, {"ACC": "ACC: 4.56 s is rounded to 4.6 s."})
 
 
 FAULTS = [
     # what is written, what it becomes, the line that counts, what the person is told
-    ('value = "3.0 s"', 'value = "5.0 s"', "ACC", "raw 30 is 3.0 s, and value says 5.0 s"),
-    ("raw = 30", "raw = 300", "ACC", "Which is meant?"),
+    ('value = "3.0 s"', 'value = "5.0 s"', "ACC", "raw 30 is 3.0 s, but value is 5.0 s"),
+    ("raw = 30", "raw = 300", "ACC", "Delete raw in this line"),
     ("raw = 30", "raw = 70000", "ACC", "does not fit uint16"),
     ("raw = 30", "raw = 3.0", "ACC", "whole number"),
     ("raw = 30", "raw = true", "ACC", "whole number"),
@@ -119,7 +119,7 @@ FAULTS = [
     ('value = "3.0 s"', 'value = "3.0 s', "ACC", "not a parameter set"),
     ("format = 1", "format = 9", "[set]", "format 9"),
     ('profile = "atv71"', "profile = 5", "[set]", "not a parameter set"),
-    ("parameters = 6", "parameters = 7", "[set]", "states 7 parameters, and 6"),
+    ("parameters = 6", "parameters = 7", "[set]", "states 7 parameters, but the file has 6"),
 ]
 
 

@@ -66,12 +66,12 @@ Change = tuple[str, str]
 FAULTS: dict[str, tuple[list[Change], str, str]] = {
     "no stop": (
         [('  { id = "stop", name = "Stop", words = [0] },\n', "")],
-        "it can run a motor and has no stop",
+        "it can run a motor but has no stop",
         "orders = [",
     ),
     "a stop in some states only": (
         [('"Stop", words = [0] }', '"Stop", words = [0], states = ["running"] }')],
-        "no stop holds in every state",
+        "no stop applies in every state",
         "orders = [",
     ),
     "nothing is seen to run": (
@@ -117,7 +117,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "a stop word that is locked while the motor runs": (
         [('access = "rw"\ngroup = "Command"', 'access = "rw-stopped"\ngroup = "Command"')],
-        "order stop: CTRL can be written only at rest (access rw-stopped)",
+        "order stop: CTRL can be written only with the motor stopped (access rw-stopped)",
         '  { id = "stop"',
     ),
     "a status word that cannot be read": (
@@ -195,7 +195,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
                 BLOCK.format(4).replace("400", "65533") + "\n# Parameters come last",
             )
         ],
-        "block block: 4 words from 65533 run past address 65535",
+        "block block: 4 words from 65533 exceed address 65535",
         "address = 65533",
     ),
     "no way to the running state": (
@@ -220,17 +220,17 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "a hidden state": (
         [(FAULT, ""), (RUNNING, f"{RUNNING}\n{FAULT.replace('0x0004', '0x0006')}")],
-        "state fault is never seen: running above it",
+        "state fault is never reached: running above it",
         'id = "fault"',
     ),
     "two words at one address": (
         [("address = 202", "address = 203")],
-        "address 203 is already that of",
+        "address 203 already belongs to",
         "address = 203\nunit",
     ),
     "a pair over another word": (
         [("\n[[enumerations]]", f"{PAIR.replace('302', '299')}\n[[enumerations]]")],
-        "PAIR is uint32 and takes 299 and 300",
+        "PAIR is uint32 and uses 299 and 300",
         "address = 299",
     ),
     "a pair that could not be written": (
@@ -255,7 +255,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "one fault twice": (
         [("raw = 7, code", "raw = 1, code")],
-        "fault 1 is there twice",
+        "fault 1 occurs twice",
         'raw = 1, code = "COM"',
     ),
     "a word that is not there": (
@@ -263,7 +263,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
         "no parameter 'KEPT'. Did you mean KEEP?",
         'parameter = "KEPT"',
     ),
-    "limits in a circle": (
+    "limits form a circle": (
         [
             ("min = 10\n", 'min = 10\nmax_from = "TOUT"\n'),
             ("min = 0\nmax = 60\n", 'min = 0\nmax = 60\nmax_from = "RAMP"\n'),
@@ -273,17 +273,17 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "a proposed value that is none": (
         [("\n[[enumerations]]", f"{SOURCE}\n[[enumerations]]")],
-        "MODE = 7: is none of its values: 0 By hand, 1 Pressure, 2 Level",
+        "MODE = 7: is not one of its values: 0 By hand, 1 Pressure, 2 Level",
         "value = 7",
     ),
     "a factory value that is no name": (
         [('2 = "Level" }\nfactory = 0', '2 = "Level" }\nfactory = 5')],
-        "MODE = 5: is none of its values",
+        "MODE = 5: is not one of its values",
         "factory = 5",
     ),
     "no source": (
         [('source = "guide 5.2"', 'source = ""')],
-        "ids: guide",
+        "Known: guide",
         'source = ""',
     ),
     "bits of two fields": (
@@ -292,7 +292,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
             ('code = "TOUT"', 'mask = 3\ncode = "TOUT"'),
             ('code = "MODE"', 'mask = 7\nshift = 1\ncode = "MODE"'),
         ],
-        "bits 16#0002 of address 201 are also those of MODE",
+        "bits 16#0002 of address 201 also belong to MODE",
         "address = 201\nunit",
     ),
     "an input register without its function": (
@@ -307,7 +307,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "a field that is none": (
         [("min = 10\n", "mini = 10\n")],
-        "there is no field `mini` here; did you mean min",
+        "`mini` is not a field of this table; did you mean min",
         "mini = 10",
     ),
     "a name that is none": (
@@ -322,7 +322,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "an id that is a word of the command": (
         [('id = "example-pump"', 'id = "path"')],
-        "'path' cannot be an id",
+        "path' is reserved",
         'id = "path"',
     ),
     "a field too few": (

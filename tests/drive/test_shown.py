@@ -83,7 +83,7 @@ def test_raw_of_text_follows_scale_and_unit_of_other_words() -> None:
     profile = profile_of(scaled, counted, parameter("M", 3))
     assert [raw_of_text(profile, profile["P"], "20 Hz", {"M": m}).raw for m in (0, 1)] == [200, 20]
     assert raw_of_text(profile, profile["C"], "5000ms", {"M": 0}).raw == 5
-    for code, text in (("P", "its scale follows M"), ("C", "its unit follows M")):
+    for code, text in (("P", "its scale depends on M"), ("C", "its unit depends on M")):
         with pytest.raises(ValueRefused, match=text):
             raw_of_text(profile, profile[code], "20", {})
     with pytest.raises(ValueRefused, match="is not a number in V"):

@@ -83,6 +83,6 @@ def test_values_changed_by_rounding(typed: str, rounded: bool, lossy: bool) -> N
 def test_edit_reports_its_rounded_value() -> None:
     held = {"LSP": 0, "HSP": 500, "TFR": 600}
     (edit,) = Edits().stage(ATV312, "LSP", "0.04 Hz", {**held, "LSP": 100})
-    assert edit.loss == "LSP: 0.04 Hz would be held as 0.0 Hz"
+    assert edit.loss == "LSP: 0.04 Hz would be rounded to 0.0 Hz"
     (edit,) = Edits().stage(ATV312, "LSP", "3.56 Hz", held)
     assert edit.loss == ""

@@ -32,12 +32,12 @@ REFUSALS = [
     ("atv71", "FCS", "stopped", "order", "is a command"),
     ("atv71", "FRY", "stopped", "forbidden", "not documented"),
     ("atv71", "UNS", "running", "running", "now running"),
-    ("atv71", "UNS", None, "running", "not known"),
-    ("atv71", "UNS", "unknown", "running", "stopped only"),
-    ("atv71", "NMA1", "running", "running", "stopped only"),
+    ("atv71", "UNS", None, "running", "unknown"),
+    ("atv71", "UNS", "unknown", "running", "with the motor stopped"),
+    ("atv71", "NMA1", "running", "running", "with the motor stopped"),
     ("atv31", "CMI", "stopped", "order", "is a command"),
     ("atv31", "PISP", "stopped", "order", "is a command"),
-    ("atv312", "LAC", "stopping", "running", "stopped only"),
+    ("atv312", "LAC", "stopping", "running", "with the motor stopped"),
     ("atv21", "FA00", "stopped", "order", "is a command"),
     ("atv21", "FA50", "stopped", "order", "is a command"),
     ("atv21", "F829", "stopped", "forbidden", "ends Modbus"),
@@ -46,7 +46,7 @@ REFUSALS = [
     ("powerdrive", "6.42", "stopped", "order", "is a command"),
     ("powerdrive", "6.32", "stopped", "order", "is a command"),
     ("varmeca", "10.33", "stopped", "order", "is a command"),
-    ("proxidrive", "6.43", "running", "running", "stopped only"),
+    ("proxidrive", "6.43", "running", "running", "with the motor stopped"),
     ("varmeca", "12.43", "stopped", "forbidden", "brake"),
 ]
 
@@ -123,10 +123,10 @@ def test_settings_can_be_written_in_some_state(family: str) -> None:
 MARKS = [
     ("atv71", "ACC", {"lost at power-off until saved"}),
     ("atv71", "UNS", {"stopped only", "lost at power-off until saved"}),
-    ("atv312", "tbr", {"stopped only", "in force after a reset of the drive",
+    ("atv312", "tbr", {"stopped only", "takes effect after a reset of the drive",
                        "lost at power-off until saved", "changes the line itself"}),
-    ("atv21", "F875", {"in force after a reset of the drive", "kept at once (EEPROM)"}),
-    ("atv21", "F111", {"stopped only", "kept at once (EEPROM)", "unverified"}),
+    ("atv21", "F875", {"takes effect after a reset of the drive", "stored at once (EEPROM)"}),
+    ("atv21", "F111", {"stopped only", "stored at once (EEPROM)", "unverified"}),
     ("atv71", "CMD", {"lost at power-off"}),
 ]  # fmt: skip
 
@@ -135,7 +135,7 @@ MARKS = [
 def test_parameter_has_its_marks(family: str, code: str, expected: set[str]) -> None:
     profile = library.load(family)
     assert set(marks(profile, profile[code])) == expected
-    later = "in force after a reset of the drive" in expected
+    later = "takes effect after a reset of the drive" in expected
     assert waits_for_reset(profile, profile[code]) == later
 
 
@@ -146,7 +146,7 @@ def test_disabling_the_timeout_is_warned_about(family: str) -> None:
     assert watch is not None
     timeout = profile[watch.timeout]
     if watch.off is not None:
-        assert "watch" in warning(profile, timeout, watch.off)
+        assert "timeout" in warning(profile, timeout, watch.off)
     assert warning(profile, timeout, 10) == ""
     for reaction in watch.reactions:
         reported = warning(profile, profile[watch.reaction], reaction.raw) if watch.reaction else ""

@@ -36,5 +36,5 @@ def test_counters_beside_a_panel_are_those_of_both_and_a_reset_is_seen_there(
         # who resets the drive's counters is told to whoever compares them
         again = drivepanel("counters", line, "-d", "1", "--reset-drive", "--arm", "--frames", "3")
         assert again.returncode == 0, again.stdout + again.stderr
-        panel.wait_for("has restarted counting")
+        panel.wait_for("restarted its counters")
         assert "STANDBY" in panel.text()

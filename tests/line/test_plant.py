@@ -204,7 +204,7 @@ def test_a_broker_that_comes_back_is_informed_everything_anew(
     assert len(broker.retained(f"{ROOT}/#")) == 3
     status, output = made.program.end()
     assert status == 0
-    assert "It is tried on." in output
+    assert "Retrying." in output
     assert "is connected again." in output
 
 

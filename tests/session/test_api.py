@@ -59,7 +59,7 @@ def test_examples_of_the_page_print_what_it_shows(
     assert "not read now" not in printed
     if "NotWritten" in example:
         assert "HSP: " in printed
-        assert "would be held as 0.0 Hz" in printed
+        assert "would be rounded to 0.0 Hz" in printed
 
 
 def test_page_names_every_part_of_the_api() -> None:
@@ -161,7 +161,7 @@ def test_refused_value_is_reported_with_its_code(drive: Drive) -> None:
 def test_value_that_would_be_rounded_is_refused(line: DriveLine) -> None:
     drive = line.drive(2)
     with drive.armed():
-        with pytest.raises(WouldRound, match=r"LSP: 0\.04 would be held as 0\.0 Hz"):
+        with pytest.raises(WouldRound, match=r"LSP: 0\.04 would be rounded to 0\.0 Hz"):
             drive.write({"LSP": 0.04})
         assert drive.write({"LSP": 0.06}, rounded=True) == {"LSP": "LSP: 0.0 Hz -> 0.1 Hz"}
 

@@ -153,7 +153,7 @@ async def test_stopped_only_is_checked_against_the_current_state() -> None:
     with bench("atv312", run_hz=20.0) as made:
         applied = await made.apply(FrS="60", ACC="4")
         assert outcomes(applied) == {"FrS": EditOutcome.REFUSED, "ACC": EditOutcome.DONE}
-        assert "motor stopped only" in text(applied, "FrS")
+        assert "with the motor stopped" in text(applied, "FrS")
         assert "FrS" in applied.left
         made.drive.halt()
         await rest(made)
@@ -369,7 +369,7 @@ async def test_saved_settings_survive_a_power_off(family: str) -> None:
 @pytest.mark.parametrize("family", ["atv21", "powerdrive", "proxidrive", "varmeca"])
 async def test_family_without_a_save_command_is_refused_with_a_reason(family: str) -> None:
     with bench(family) as made:
-        with pytest.raises(MemoryRefused, match=r"nothing is to be saved|keypad"):
+        with pytest.raises(MemoryRefused, match=r"have to save|keypad"):
             await save_to_eeprom(made.session, made.journal, made.permit())
         with pytest.raises(MemoryRefused, match="keypad"):
             await factory_reset(made.session, made.journal, made.permit(), confirmed={"CMI"})

@@ -266,7 +266,7 @@ REFUSALS = [
     ("atv312", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("atv71", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("powerdrive", {"6.43": 0}, "forward", r"6\.43 is Terminals\. .*t takes the control"),
-    ("atv312", {"rFC": 97}, "forward", r"reference channel 2 \(Fr2\), which counts, is None"),
+    ("atv312", {"rFC": 97}, "forward", r"the active reference channel 2 \(Fr2\) is None"),
     ("atv71", {}, "reset", r"No fault to reset: the drive is in the state "),
     ("atv31", {}, "take-control", r"no command 'take control'"),
 ]
@@ -357,7 +357,7 @@ async def test_options_of_an_altivar_21_persist_between_commands() -> None:
         await made.order("forward")
         assert made.drive.raw("FA00") == 0xC440
         made.commander.choose_option(options["motor"], 0x0010)
-        assert "stopped only" in await made.done(OutcomeKind.REFUSED)
+        assert "with the motor stopped" in await made.done(OutcomeKind.REFUSED)
         made.stopper.stop([made.session])
         await made.until(lambda: made.stopped)
         assert made.drive.raw("FA00") == 0xC040

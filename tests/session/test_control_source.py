@@ -37,7 +37,7 @@ async def test_control_source_is_not_changed_while_the_motor_turns() -> None:
         await made.order("forward")
         before = made.writes()
         made.commander.configure(made.session.profile.data.control_sources[3])
-        assert "motor stopped only" in await made.done(OutcomeKind.REFUSED)
+        assert "with the motor stopped" in await made.done(OutcomeKind.REFUSED)
         assert made.writes() == before
 
 

@@ -77,7 +77,7 @@ async def test_fault_record_is_formatted_as_text() -> None:
         session = made.session
         text = record_text(session, recorder.latest, [("FE00", "Output frequency", "12.34 Hz")])
         assert "- Probably (manual): " in text
-        assert "- Look at FA00, Command word: 16#D000 (bit 12" in record_text(
+        assert "- Check FA00, Command word: 16#D000 (bit 12" in record_text(
             session, recorder.latest, [], {"FA00": "16#D000"}
         )
         for part in ("E (17) Emergency stop", "| FE00 | Output frequency | 12.34 Hz |", "Run forw"):

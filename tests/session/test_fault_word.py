@@ -116,7 +116,7 @@ def test_status_and_run_report_the_same_refusal() -> None:
     atv21 = library.load("atv21")
     chart = atv21.data.charts[0]
     coasting = {"FD01": 0x0800, "FC90": 0}
-    assert "possible in the states" in state_refusal(atv21, chart, "forward", coasting)
+    assert "possible only in these states" in state_refusal(atv21, chart, "forward", coasting)
     assert state_refusal(atv21, chart, "forward", {"FD01": 0x4000, "FC90": 0}) == ""
     assert state_refusal(atv21, chart, "forward", {"FD01": 0x4000, "FC90": 24}) == IN_FAULT
 

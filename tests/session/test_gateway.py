@@ -401,7 +401,7 @@ async def test_second_client_that_commands_the_drive_is_reported(bench: Make) ->
     made.client = TcpClient(2, "10.0.0.10:5000")
     assert await made.write(LFR, 320) == 0
     (text,) = output
-    assert "10.0.0.10:5000 commands this drive now, as client 10.0.0.9:5000 did" in text
+    assert "10.0.0.10:5000 now commands this drive, instead of 10.0.0.9:5000" in text
 
 
 async def test_repeated_run_word_does_not_undo_a_stop_of_another_client(

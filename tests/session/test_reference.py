@@ -42,9 +42,9 @@ async def test_reference_whose_scale_cannot_be_read_is_not_written() -> None:
     installed_mixer(SCALE_BY)
     async with bench(MIXER, sets={"MODE": 7}) as made:
         made.commander.refer("20Hz")
-        assert "its scale follows MODE" in await made.done(OutcomeKind.REFUSED)
+        assert "its scale depends on MODE" in await made.done(OutcomeKind.REFUSED)
         made.commander.run("forward", "20Hz")
-        assert "its scale follows MODE" in await made.done(OutcomeKind.REFUSED)
+        assert "its scale depends on MODE" in await made.done(OutcomeKind.REFUSED)
         assert made.writes() == []
 
 

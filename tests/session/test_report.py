@@ -60,8 +60,8 @@ async def test_changed_settings_are_listed_with_old_values() -> None:
     faults = text.partition("## Faults")[2].partition("## ")[0]
     assert "What OCF Overcurrent points at:" in faults
     assert "- Probably (general practice): " in faults
-    assert "- Look at ACC, " in faults
-    assert "- Reset (recalled, not sure): " in faults
+    assert "- Check ACC, " in faults
+    assert "- Reset (unverified): " in faults
     assert faults.count("points at:") == 1
     assert "| SP2 | 10.0 Hz | 7.0 Hz | ok | setting |" in text
 

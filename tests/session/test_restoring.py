@@ -328,7 +328,7 @@ def test_common_quantities_are_converted_between_families() -> None:
         "ACC": "3.1 s", "HSP": "45.0 Hz", "SP2": "12.3 Hz",
     }  # fmt: skip
     reported = {item.code: item for item in found.items}
-    assert reported["ACC"].text == "ACC: 3.14 s is held as 3.1 s."
+    assert reported["ACC"].text == "ACC: 3.14 s is rounded to 3.1 s."
     assert reported["dEC"].kind == "equal"
     assert reported["UnS"].reason == "rating"
     assert reported["atv71 CTT"].reason == reported["atv71 ADD"].reason == "no counterpart"

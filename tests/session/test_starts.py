@@ -520,7 +520,7 @@ def test_damaged_file_is_set_aside(
     file.write_bytes(text)
     with caplog.at_level(logging.ERROR, logger="drivepanel"):
         assert starts.found(LINE, 2) is None
-    assert "is damaged and set aside" in caplog.text
+    assert "is damaged and was renamed" in caplog.text
     assert file.with_suffix(".damaged").read_bytes() == text
     starts.begin(start(ENDED + 1))
     assert starts.found(LINE, 2) is not None

@@ -255,12 +255,14 @@ def test_report_from_another_thread_is_kept(journal: Journal) -> None:
 def test_command_allowed_in_no_state_is_refused_with_a_reason() -> None:
     profile = library.load("atv21")
     chart = profile.data.charts[0]
-    with pytest.raises(OrderRefused, match=r"possible in the states: .*Fault.* It is now: Standby"):
+    with pytest.raises(
+        OrderRefused, match=r"possible only in these states: .*Fault.* present state is Standby"
+    ):
         choose(chart, "reset", {"FD01": 0x4000})
     with pytest.raises(OrderRefused, match="no command 'take control'"):
         choose(chart, "take-control", {"FD01": 0x4000})
     leroy = library.load("powerdrive").data.charts[0]
-    with pytest.raises(OrderRefused, match=r"needs 6\.43 = 1"):
+    with pytest.raises(OrderRefused, match=r"requires 6\.43 = 1"):
         choose(leroy, "forward", {"10.40": 1, "6.43": 0})
 
 

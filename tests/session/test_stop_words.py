@@ -119,7 +119,7 @@ def test_common_stop_word_is_safe_in_all_charts() -> None:
     assert stop_in_any(ATV71, {})[1].words == [0x0000]
     assert stop_in_any(ATV71, {"CHCF": 1})[1].words == [0x0007]
     assert stop_in_any(ATV71, {"CHCF": 3})[1].words == [0x0000]
-    with pytest.raises(OrderRefused, match="How this drive is commanded"):
+    with pytest.raises(OrderRefused, match="command words of this drive"):
         stop_in_any(ATV71, {"CHCF": 0})
 
 

@@ -131,14 +131,14 @@ async def test_unknown_sign_leaves_the_word_raw() -> None:
 
 async def test_scaled_value_cannot_be_learned() -> None:
     line, teacher = drive()
-    with pytest.raises(ValueRefused, match="nothing is to be taught"):
+    with pytest.raises(ValueRefused, match="is already known"):
         await teacher.look("KNOWN", "12")
     assert line.requested == []
 
 
 async def test_invalid_number_is_refused_before_any_request() -> None:
     line, teacher = drive()
-    with pytest.raises(ValueRefused, match="not a number of a display"):
+    with pytest.raises(ValueRefused, match="not a displayed value"):
         await teacher.look("HZ", "fast")
     assert line.requested == []
 
@@ -201,7 +201,7 @@ async def test_preset_in_rpm_accepts_a_speed() -> None:
     assert teacher.session.profile.quantity("command_frequency") is None
 
 
-@pytest.mark.parametrize(("unit", "why"), [("%", "given in Hz or rpm"), ("", "no unit")])
+@pytest.mark.parametrize(("unit", "why"), [("%", "needs Hz or rpm"), ("", "no unit")])
 async def test_preset_in_another_unit_accepts_no_reference(unit: str, why: str) -> None:
     teacher = await preset(unit)
     assert teacher.proposal() == ""
@@ -211,10 +211,10 @@ async def test_preset_in_another_unit_accepts_no_reference(unit: str, why: str) 
 
 async def test_value_without_a_scale_or_preset_is_refused() -> None:
     line, teacher = drive()
-    with pytest.raises(ValueRefused, match="not taught yet"):
+    with pytest.raises(ValueRefused, match="not learned yet"):
         teacher.confirm_reference("PRESET")
     await two_looks(line, teacher)
-    with pytest.raises(ValueRefused, match="PRESET may"):
+    with pytest.raises(ValueRefused, match="Use PRESET"):
         teacher.confirm_reference("HZ")
 
 
@@ -271,7 +271,7 @@ async def test_reference_that_could_be_negative_is_refused() -> None:
     teacher = await preset("Hz")
     teacher.confirm_reference("PRESET")
     assert (await parsed(teacher, "3276.7")).raw == 0x7FFF
-    with pytest.raises(ValueRefused, match="sign is open"):
+    with pytest.raises(ValueRefused, match="sign of such values"):
         await parsed(teacher, "3276.8")
 
 

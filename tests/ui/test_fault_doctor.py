@@ -61,7 +61,7 @@ def test_general_practice_is_marked() -> None:
 
 
 def test_drive_reports_if_a_reset_is_possible() -> None:
-    for raw, output in ((0x0004, "x works now"), (0, "Not yet, says the drive")):
+    for raw, output in ((0x0004, "x works now"), (0, "Not yet: the drive reports")):
         text = reported(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW)))
         assert output in text
         assert "practice" not in text.partition("Reset")[2].splitlines()[0]
@@ -70,7 +70,7 @@ def test_drive_reports_if_a_reset_is_possible() -> None:
         for code, reading in readings_of(ATV71, {"ETI": 4}, NOW).items()
     }
     text = reported(view(9, readings=old)).replace(" practice", "")
-    assert "x does nothing" in " ".join(text.split())
+    assert "x has no effect" in " ".join(text.split())
 
 
 @pytest.mark.parametrize(("width", "height"), [(60, 16), (60, 12), (80, 20), (80, 12)])

@@ -132,7 +132,7 @@ async def test_counters_of_the_open_drive_are_shown_for_both_sides() -> None:
         await made.pilot.press("tab", "tab")
         await made.until(lambda: "Counters of drive 1" in made.shown("frames"))
         await made.until(lambda: "function 8" in made.shown("frames"))
-        await made.until(lambda: "all sent by this program" in made.shown("frames"))
+        await made.until(lambda: "All were sent here" in made.shown("frames"))
         screen = made.app.screen
         assert isinstance(screen, FramesScreen)
         watch = screen.console.counters
@@ -141,9 +141,9 @@ async def test_counters_of_the_open_drive_are_shown_for_both_sides() -> None:
         await made.until(lambda: "Device 1 did not" in made.shown("frames"))
         made.simulation.faults.rates = FaultRates()
         await made.until(lambda: not watch.trouble and watch.now().differences)
-        await made.until(lambda: "■ The drive saw" in made.shown("frames"))
+        await made.until(lambda: "■ The drive received" in made.shown("frames"))
         await made.pilot.press("C")
-        await made.until(lambda: "The drive saw" not in made.shown("frames"))
+        await made.until(lambda: "The drive received" not in made.shown("frames"))
         await made.until(lambda: "Counted from now on" in made.shown("said"))
         await made.pilot.press("tab")
         await made.until(lambda: "Frames on the line" in made.shown("frames"))

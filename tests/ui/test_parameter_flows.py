@@ -110,7 +110,7 @@ async def test_parameter_is_found_edited_written_and_verified() -> None:
         await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
         await made.pilot.press(*"7.53", "enter")
         await until(made.pilot, lambda: "→ 7.5 s" in table(made))
-        await message(made, "7.53 is held as 7.5 s")
+        await message(made, "7.53 is rounded to 7.5 s")
         assert made.drive().raw("ACC") == 30
         await made.pilot.press("w")
         await message(made, "Not armed")

@@ -62,7 +62,7 @@ async def test_two_readings_set_the_scale_and_a_disagreeing_third_discards_it() 
         await pick(made, "5.01")
         assert "Taught: 1 count is 0.1 Hz" in str(app.screen.query_one("#about").render())
         await look(made, "20.0")
-        await made.message("no longer taught")
+        await made.message("shown raw again")
         await until(pilot, lambda: "Output ?" in shown(app, "readouts"))
         assert writes(app) == []
 
@@ -74,7 +74,7 @@ async def test_invalid_display_number_is_reported_in_question() -> None:
         await made.pilot.pause(0.4)
         await made.pilot.press("enter")
         fault = made.app.screen.query_one("#fault")
-        await until(made.pilot, lambda: "not a number of a display" in str(fault.render()))
+        await until(made.pilot, lambda: "not a displayed value" in str(fault.render()))
         await made.pilot.press("escape")
 
 
@@ -118,9 +118,7 @@ async def test_l_on_a_scaled_parameter_says_that_its_scale_is_known() -> None:
         await until(pilot, lambda: isinstance(app.screen, ParametersScreen))
         await until(pilot, lambda: "15.07" in shown(app, "detail"))
         await pilot.press("L")
-        await until(
-            pilot, lambda: "nothing is to be taught" in " ".join(shown(app, "said").split())
-        )
+        await until(pilot, lambda: "is already known" in " ".join(shown(app, "said").split()))
         assert not isinstance(app.screen, Ask)
 
 

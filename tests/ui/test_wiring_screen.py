@@ -74,7 +74,7 @@ async def test_scrolling_by_sections_and_lines_stops_at_the_end() -> None:
         first = made.shown("page").splitlines()[0]
         assert first == " Warnings"
         await made.pilot.press("tab")
-        assert made.shown("page").splitlines()[0] == " Before it is opened"
+        assert made.shown("page").splitlines()[0] == " Before you open the drive"
         await made.pilot.press("shift+tab")
         assert made.shown("page").splitlines()[0] == first
         await made.pilot.press("down")

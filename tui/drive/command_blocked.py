@@ -36,7 +36,7 @@ def held_back(
     """Return the reason against a command, if any; a deciding word that is unknown is a reason."""
     if (lock := locked_by(chart, id, raws)) is not None:
         if lock.parameter not in raws:
-            return CommandBlocked(f"{lock.parameter} is not known, and it decides: {lock.text}")
+            return CommandBlocked(f"{lock.parameter} was not read, and may block this: {lock.text}")
         channel = _is_set_up(profile, lock.parameter)
         return CommandBlocked(lock.text, lock.remedy, "set-up" if channel else "", channel)
     if id not in MOVING_ORDERS or not chart.orders:
@@ -72,11 +72,13 @@ def _by_others(profile: Profile, found: Channel) -> CommandBlocked:
     """Return the reason if another source commands the drive, or the commander is unknown."""
     word = found.parameter
     if word is None:
-        return CommandBlocked("Who commands the drive is not known.", by_channel=True)
+        return CommandBlocked("The source of the drive's commands is unknown.", by_channel=True)
     if found.by_line is None:
-        return CommandBlocked(f"{word.code} is not known, and it decides who commands the drive.")
-    counts = ", which counts," if found.is_several else ""
-    name = f"{word.name[0].lower()}{word.name[1:]} ({word.code}){counts}"
+        return CommandBlocked(
+            f"{word.code}, which selects the source of the drive's commands, was not read."
+        )
+    active = "the active " if found.is_several else ""
+    name = f"{active}{word.name[0].lower()}{word.name[1:]} ({word.code})"
     text = f"The drive is not commanded by Modbus: {name} is {found.text}."
     way: UnblockHint = "set-up" if profile.data.control_sources else ""
     return CommandBlocked(text, profile.data.channels.remedy, way, by_channel=True)

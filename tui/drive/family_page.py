@@ -64,16 +64,16 @@ def family_page(profile: Profile) -> list[PageSection]:
     data = profile.data
     sections = [
         PageSection("Warnings", tuple(_warnings(data))),
-        PageSection("Before it is opened", tuple(_opening(data))),
+        PageSection("Before you open the drive", tuple(_opening(data))),
         *(PageSection(f"Pins: {c.name}", tuple(_pins(c))) for c in data.connectors),
-        PageSection("Names of the signals", tuple(_signals(data))),
+        PageSection("Signal names", tuple(_signals(data))),
         PageSection("Line", tuple(_line(data))),
         PageSection("Addresses", tuple(_addresses(data))),
-        PageSection("When the line falls silent", tuple(_silence(data))),
+        PageSection("On a communication loss", tuple(_silence(data))),
         PageSection("After a fault reset", tuple(_after_reset(data))),
         PageSection("Lamps and display", tuple(_lamps(data))),
         PageSection("Command words", tuple(_commands(data))),
-        PageSection("Where the manuals are wrong", tuple(_errata(data))),
+        PageSection("Errors in the manuals", tuple(_errata(data))),
     ]
     return [section for section in sections if section.rows]
 
@@ -115,7 +115,7 @@ def _opening(data: ProfileData) -> Iterator[PageRow]:
     opening = data.wiring.opening
     if opening is None:
         return
-    wait = f"{opening.minutes} minutes" if opening.minutes else "not known"
+    wait = f"{opening.minutes} minutes" if opening.minutes else "unknown"
     below = f"; DC bus below {opening.below_volts} V, measured" if opening.below_volts else ""
     yield PageRow("Wait", wait + below, SURENESS[opening.confidence], True)
     if opening.note:
@@ -138,10 +138,10 @@ def _signals(data: ProfileData) -> Iterator[PageRow]:
 
 def _line(data: ProfileData) -> Iterator[PageRow]:
     link = data.link
-    yield PageRow("As it leaves", f"{link.baud} bit/s, {link.format}")
+    yield PageRow("Factory", f"{link.baud} bit/s, {link.format}")
     if link.bauds or link.formats:
         rates = ", ".join(map(str, link.bauds or [link.baud]))
-        yield PageRow("It can", f"{rates} bit/s; {', '.join(link.formats or [link.format])}")
+        yield PageRow("Possible", f"{rates} bit/s; {', '.join(link.formats or [link.format])}")
     if link.note:
         yield PageRow("", link.note)
     for rule in data.line_rules:
@@ -152,11 +152,11 @@ def _addresses(data: ProfileData) -> Iterator[PageRow]:
     known = data.addresses
     off = known.off is not None and known.factory == known.off
     left = "OFF" if off else str(known.factory)
-    yield PageRow("Its own", f"{known.first} to {known.last}; leaves the factory with {left}")
+    yield PageRow("Drive", f"{known.first} to {known.last}; factory setting {left}")
     if known.off is not None:
         yield PageRow("Off", f"{known.off}: the drive does not answer", "", True)
     if known.zero_digit_is_group:
-        text = "an address with a digit 0 (10, 20, 100) calls a group of drives"
+        text = "an address with a digit 0 (10, 20, 100) selects a group of drives"
         yield PageRow("Groups", text, "", True)
     sent = f"address {known.broadcast}" if known.broadcast is not None else "none"
     yield PageRow("Broadcast", sent)
@@ -164,17 +164,17 @@ def _addresses(data: ProfileData) -> Iterator[PageRow]:
         yield PageRow("", known.note)
     for server in known.servers:
         text = f"{server.name}: {server.note}" if server.note else server.name
-        yield PageRow(server.parameter, f"another server, address of its own. {text}")
+        yield PageRow(server.parameter, f"another server with its own address. {text}")
 
 
 def _silence(data: ProfileData) -> Iterator[PageRow]:
     watch = data.communication_fault
     if watch is None:
-        yield PageRow("", "What this family does then is in no document at hand.", "", True)
+        yield PageRow("", "No available document describes the reaction.", "", True)
         return
     off = f"; {watch.off} switches it off" if watch.off is not None else ""
     yield PageRow("Timeout", f"{watch.timeout}{off}")
-    yield PageRow("It begins", watch.starts)
+    yield PageRow("Starts", watch.starts)
     for reaction in watch.reactions:
         head = f"{watch.reaction} = {reaction.raw}" if watch.reaction else reaction.name
         yield PageRow(head, f"{reaction.name}: {reaction.does}", "", reaction.motor_keeps_running)

@@ -14,8 +14,8 @@ from .reset_text import MAY_START
 from .values import set_bits
 
 NOT_IN_COMMAND = "Drive Panel does not hold the command channel"
-INPUTS_NOT_READ = "Its inputs were not read: look at the terminals."
-NO_INPUTS = "Its inputs cannot be read over Modbus: look at the terminals."
+INPUTS_NOT_READ = "Its inputs were not read: check the terminals."
+NO_INPUTS = "Its inputs cannot be read over Modbus: check the terminals."
 NONE_CLOSED = "No input is closed at the terminals now."
 
 

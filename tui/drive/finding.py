@@ -187,6 +187,6 @@ def watching_text(families: Sequence[WatchingFamily]) -> str:
         return ""
     parts = [part for part in (sure, f"and perhaps {likely}" if likely else "") if part]
     return (
-        f"These watch the line from the first request, and react to their communication timeout"
-        f" when polling stops: {', '.join(parts)}."
+        "Drives of these families start their communication timeout with the first request, and"
+        f" react when polling stops: {', '.join(parts)}."
     )

@@ -200,9 +200,9 @@ def setting_refusal(profile: Profile, found: ExternalWord, allowed: Collection[s
         if parameter.code in allowed:
             continue
         if ALL not in allowed:
-            return f"{parameter.code} is not allowed: --allow-writes {parameter.code} allows it."
+            return f"{parameter.code} is not allowed. Use --allow-writes {parameter.code}."
         if parameter.code in _named_only(profile) or not is_verified(parameter):
-            return f"{parameter.code} is allowed by its name only: --allow-writes {parameter.code}."
+            return f"`all` does not allow {parameter.code}. Use --allow-writes {parameter.code}."
     return ""
 
 
@@ -222,7 +222,7 @@ def value_refusal(profile: Profile, parameter: Parameter, words: Mapping[int, in
     """Return why a value is never written, or only half of it was; empty if it may be written."""
     own = [parameter.address + offset for offset in range(word_count(parameter))]
     if any(address not in words for address in own):
-        return f"{parameter.code} has two words: both are written, or none."
+        return f"{parameter.code} has two words. Write both in one request."
     raw = from_words(parameter, [words[address] for address in own])
     if why := never_set(profile, parameter, raw):
         return why

@@ -18,14 +18,14 @@ TRUST: Mapping[HelpConfidence, str] = {
 }
 """Text for the certainty of the first cause."""
 RESETS: Mapping[ResetWay | None, str] = {
-    "by-reset": "{by} once the cause is gone.",
-    "automatic": "{by} once the cause is gone, or the automatic restart, if it is on.",
-    "by-itself": "The drive leaves the fault once the cause is gone; a run command may start it.",
-    "power-cycle": "Switch off and on once the cause is gone; {by} does nothing.",
-    None: "{by} once the cause is gone.",
+    "by-reset": "{by} once the cause is removed.",
+    "automatic": "{by} once the cause is removed, or the automatic restart if it is on.",
+    "by-itself": "The drive leaves the fault once the cause is removed, and may start.",
+    "power-cycle": "Switch the drive off and on once the cause is removed; {by} has no effect.",
+    None: "{by} once the cause is removed.",
 }
-RESET_NOW = "{by} works now, says the drive."
-RESET_NOT_YET = "Not yet, says the drive: the cause is still there."
+RESET_NOW = "{by} works now, as the drive reports."
+RESET_NOT_YET = "Not yet: the drive reports that the cause is still present."
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,11 +146,11 @@ def hint_markdown(
         lines.append(f"- Check (general practice): {_joined(left.check)}")
     lines += [f"- {advice.text}: {advice.reason}." for advice in left.excluded]
     lines += [
-        f"- Look at {look.code}, {profile[look.code].name}: {value(look.code)} ({look.why})"
+        f"- Check {look.code}, {profile[look.code].name}: {value(look.code)} ({look.why})"
         for look in hint.look_at
     ]
     if reset:
-        lines.append(f"- Reset (recalled, not sure): {reset}")
+        lines.append(f"- Reset (unverified): {reset}")
     return lines
 
 

@@ -35,7 +35,7 @@ def model_read(profile: Profile, raws: Mapping[str, int]) -> str:
     if model is not None:
         return model_text(model)
     code = raws.get(profile.data.identification.model_parameter)
-    return f"code {code}, in no list at hand" if code is not None else ""
+    return f"code {code}, not in the profile" if code is not None else ""
 
 
 def model_text(model: Model) -> str:

@@ -62,11 +62,13 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | No
             return order
     if fitting:
         needed = " or ".join(_conditions(order) for order in fitting)
-        raise OrderRefused(f"{fitting[0].name} needs {needed}.")
+        raise OrderRefused(f"{fitting[0].name} requires {needed}.")
     names = {s.id: s.name for s in chart.states}
     allowed = ", ".join(dict.fromkeys(names[s] for order in same for s in order.states))
-    now = state.name if state else "not known"
-    raise OrderRefused(f"{same[0].name} is possible in the states: {allowed}. It is now: {now}.")
+    now = state.name if state else "unknown"
+    raise OrderRefused(
+        f"{same[0].name} is possible only in these states: {allowed}. The present state is {now}."
+    )
 
 
 def follows_from(chart: Chart, id: OrderId) -> str:
@@ -112,7 +114,7 @@ def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order
                     for other in charts
                 ):
                     return chart, order
-    raise OrderRefused("How this drive is commanded is not known.")
+    raise OrderRefused("The command words of this drive are unknown.")
 
 
 def _may_hold(chart: Chart, raws: Mapping[str, int]) -> bool:

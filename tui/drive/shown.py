@@ -51,15 +51,17 @@ def raw_of_text(
         if unit == "raw":
             follows = parameter.unit_by.parameter
             raise ValueRefused(
-                f"{parameter.code}: its unit follows {follows}, which was not read; nothing can be"
-                " written."
+                f"{parameter.code} cannot be written: its unit depends on {follows}, which was not"
+                " read."
             )
         parameter = structs.replace(parameter, unit=unit)
     scale = profile.scale(parameter, raws, absent)
     found = encode(parameter, text, profile.names(parameter), scale)
     taught = profile.taught.get(parameter.code)
     if taught is not None and taught.number(found.raw) is None:
-        raise ValueRefused(f"{text} is past what is known of {parameter.code}: its sign is open.")
+        raise ValueRefused(
+            f"{text} may be wrong for {parameter.code}: the sign of such values was not learned."
+        )
     return found
 
 

@@ -20,11 +20,11 @@ def why_not_taught(family: Profile, code: str) -> str:
     """Return why a parameter's scale cannot be taught; empty if it can."""
     parameter = family[code]
     if parameter.access == "w" or parameter.bits or word_count(parameter) != 1:
-        return f"{code} is not a number of one word: it has no scale to teach."
+        return f"{code} has no scale that can be learned: it is not a number of one word."
     if family.names(parameter) and is_enumeration(parameter):
-        return f"{code} has names for its values: it has no scale to teach."
+        return f"{code} has no scale that can be learned: its values have names."
     if not is_raw(family, parameter):
-        return f"{code} has its scale from {family.name}'s profile: nothing is to be taught."
+        return f"The scale of {code} is already known from the profile of {family.name}."
     return ""
 
 
@@ -55,13 +55,13 @@ def why_no_reference(family: Profile, code: str, taught: Mapping[str, TaughtScal
     """Return why a parameter cannot take the reference; empty if it can after confirmation."""
     if reference_of(family, code) is None:
         known = ", ".join(reference.parameter for reference in family.data.teachable_references)
-        may = f"{known} may." if known else f"{family.name} has none that may."
-        return f"{code} does not take the reference; {may}"
+        may = f"Use {known}." if known else f"{family.name} has no such parameter."
+        return f"{code} cannot take the reference. {may}"
     if (scale := taught.get(code)) is None:
-        return f"{code}: its scale was not taught yet."
+        return f"The scale of {code} was not learned yet. Teach it first."
     if scale.unit not in REFERENCE_UNITS:
         unit = scale.unit or "no unit"
-        return f"{code} was taught in {unit}: a reference is given in Hz or rpm."
+        return f"{code} was learned in {unit}, but a reference needs Hz or rpm."
     return ""
 
 

@@ -114,10 +114,10 @@ def parse_display(text: str, unit: str = "") -> tuple[Decimal, str]:
     typed = text.strip().replace("\N{MINUS SIGN}", "-")
     match = _TYPED.fullmatch(typed)
     if match is None:
-        raise ValueRefused(f"{text!r} is not a number of a display. Write it like 50.3 or -12 A.")
+        raise ValueRefused(f"{text!r} is not a displayed value. Write it like 50.3 or -12 A.")
     beside = match[3] or ""
     if beside and unit and unit_named(beside) != unit_named(unit):
-        raise ValueRefused(f"Either {beside} or {unit}: type one unit.")
+        raise ValueRefused(f"Two units: {beside} and {unit}. Type one of them.")
     number = Decimal(match[1] + match[2].replace(",", "."))
     return number, unit_named(beside or unit)
 
@@ -171,12 +171,12 @@ def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson
     if len({item.word for item in looks}) < 2:
         kind = LessonKind.SAME if before else LessonKind.FIRST
         again = " again" if before else ""
-        text = f"{code}: {look.text}{again}. Look again at another value."
+        text = f"{code}: {look.text}{again}. Enter another value of the display."
         return Lesson(kind, looks, text)
     fits = " or ".join(
         dict.fromkeys(f"{taught_scale.scale:f}" for taught_scale in scales_that_fit(looks))
     )
-    text = f"{code}: 1 count is {fits}. Look again at a larger value ({look.text})."
+    text = f"{code}: 1 count is {fits}. Enter a larger value of the display ({look.text})."
     return Lesson(LessonKind.UNSURE, looks, text)
 
 
@@ -190,11 +190,11 @@ def _contradiction(
         why = f"no usual scale gives {look.shown:f} for raw {look.word}"
     else:
         why = f"no usual scale fits {' and '.join(item.text for item in (*before[-2:], look))}"
-    check = "Was it the same parameter, and was the value steady?"
+    check = "Check that the display shows this parameter, and that its value is steady."
     if known is not None:
-        text = f"{code} is no longer taught ({known.text} before): {why}. It is shown raw. {check}"
+        text = f"{code} is shown raw again, because {why}. Before: {known.text}. {check}"
         return Lesson(LessonKind.ENDED, kept, text)
-    text = f"{code}: nothing is taught, {why}. {check}"
+    text = f"{code}: no scale was learned, because {why}. {check}"
     return Lesson(LessonKind.DISAGREES, kept, text)
 
 
@@ -231,8 +231,8 @@ def _unit_of(looks: Iterable[DisplayLook]) -> str | None:
 def _sign_text(scale: TaughtScale) -> str:
     if scale.signed is None:
         return (
-            " Whether it can be negative is unknown: from raw 32768 on it is shown raw until a look"
-            " there shows it."
+            " The sign is unknown: from raw 32768 on, it is shown raw until you enter such a value"
+            " of the display."
         )
     return " It has a sign." if scale.signed else " It has no sign."
 

@@ -90,7 +90,7 @@ def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[i
         if held is None:
             if is_field(parameter):
                 raise ValueRefused(
-                    f"{parameter.code} is some bits of a word whose others are not known here."
+                    f"{parameter.code} is a part of a word, and the other bits were not read."
                 )
             held = 0
         return (held & ~own & 0xFFFF | raw << parameter.shift & own,)
@@ -192,8 +192,8 @@ def encode(
     if raw is None:
         if scale is None:
             raise ValueRefused(
-                f"{parameter.code}: its scale follows {_scale_source(parameter)}, which was not"
-                " read; nothing can be written."
+                f"{parameter.code} cannot be written: its scale depends on"
+                f" {_scale_source(parameter)}, which was not read."
             )
         number = _number(parameter, typed, names)
         counts = number / scale
@@ -218,7 +218,7 @@ def check_raw(
         )
     to_words(parameter, raw, held=0)
     if is_enumeration(parameter) and raw not in names:
-        raise ValueRefused(f"{parameter.code}: {raw} is none of its values.")
+        raise ValueRefused(f"{parameter.code}: {raw} is not one of its values.")
     taken = [bit for bit in parameter.reserved if raw >> bit & 1]
     if taken:
         bits = ", ".join(str(bit) for bit in taken)
@@ -235,7 +235,7 @@ def _doubt(parameter: Parameter) -> str:
     """Return a remark if no document of the family states the limits; else empty."""
     grounds = parameter.limit_grounds
     weak = grounds is not None and grounds.confidence in ("analogy", "unverified")
-    return " (limits that no document of this family states)" if weak else ""
+    return "; no document of this family states these limits" if weak else ""
 
 
 def _scale_source(parameter: Parameter) -> str:

@@ -25,7 +25,7 @@ class OverheardRequest(NamedTuple):
     @property
     def text(self) -> str:
         """Request in few words."""
-        several = f" on, {self.words} words" if self.words > 1 else ""
+        several = f" to {self.register + self.words - 1}" if self.words > 1 else ""
         if self.function in READS:
             return f"read of {READS[self.function]} {self.register}{several}"
         if self.function in WRITES:

@@ -17,7 +17,7 @@ from ..shared.errors import USAGE, Failure
 PASSWORD_SETTING = "DRIVEPANEL_MQTT_PASSWORD"
 """Environment variable: the password for the broker."""
 PORTS = {"mqtt": 1883, "mqtts": 8883}
-SHAPE = "write mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS"
+SHAPE = "use mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS"
 NO_LEVEL = re.compile(r"[/+#\s\x00-\x1f\x7f]+")
 """Characters with a meaning of their own in a topic, or forbidden in one."""
 
@@ -60,7 +60,7 @@ def broker_of(url: str, password_file: Path | None) -> Broker:
         raise click.UsageError(f"{url!r}: {error}; {SHAPE}.") from error
     if parts.password is not None:
         raise click.UsageError(
-            "A password in the URL is seen by every user of this computer: put it into a file"
+            "Every user of this computer can see a password in the URL. Put it into a file"
             f" (--mqtt-password-file) or into {PASSWORD_SETTING}."
         )
     if parts.scheme not in PORTS or not parts.hostname or parts.query or parts.fragment:
@@ -93,7 +93,9 @@ def _root(path: str) -> str:
     if not root:
         return f"drivepanel/{level(socket.gethostname())}"
     if any(not part or NO_LEVEL.search(part) for part in root.split("/")) or root.startswith("$"):
-        raise click.UsageError(f"{root!r} can be no topic: no +, #, spaces, nor $ in front.")
+        raise click.UsageError(
+            f"{root!r} is not a topic. Use no +, # or spaces, and no $ at the start."
+        )
     return root
 
 
@@ -108,6 +110,6 @@ def need_mqtt(load: Callable[[str], Any] = __import__) -> None:
         load("aiomqtt")
     except ImportError as error:
         raise Failure(
-            "MQTT needs the package aiomqtt, which is not here: pip install 'drivepanel[mqtt]'.",
+            "MQTT needs the package aiomqtt. Install it: pip install 'drivepanel[mqtt]'.",
             USAGE,
         ) from error

@@ -89,8 +89,8 @@ class PlantLine:
             slowest = max((cycle.period for cycle in cycles if not cycle.error), default=0.0)
             if full != any(cycle.too_slow for cycle in cycles if not cycle.error):
                 full = not full
-                text = f"a cycle takes up to {slowest:.1f} s: the line is full."
-                text = text if full else "the cycle time is kept again."
+                text = f"the line is full. A cycle takes up to {slowest:.1f} s."
+                text = text if full else "the cycle time is as requested again."
                 say(f"drivepanel: {self.name}: {text}", err=True)
 
     async def _first_looks(self) -> None:
@@ -133,7 +133,7 @@ class PlantDrive:
         self._session: DriveSession | None = None
         self.cycle: Snapshot | None = None
         """Its last cycle."""
-        self._error = f"Device {self.device} was not asked yet."
+        self._error = f"Device {self.device} was not polled yet."
         self._contact: Contact = "not_polled"
         self._good = 0.0
 
@@ -210,7 +210,7 @@ class PlantDrive:
     def _tell(self, error: str) -> None:
         if error and error != self._error:
             who = "" if error.startswith(f"Device {self.device}") else f"Device {self.device}: "
-            say(f"drivepanel: {who}{error} It is tried on.", err=True)
+            say(f"drivepanel: {who}{error} Retrying.", err=True)
         self._error = error
         self._changed()
 

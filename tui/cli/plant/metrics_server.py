@@ -71,7 +71,7 @@ class MetricsServer:
                 writer.write(self._answer(head, self._names | {own}))
                 await writer.drain()
         except (OSError, EOFError, TimeoutError, asyncio.LimitOverrunError) as error:
-            log.info("who asked for metrics was let go: %s", error or "too slow")
+            log.info("a client of the metrics was disconnected: %s", error or "too slow")
         except asyncio.CancelledError:
             # closing the server is not an error of this connection
             return
@@ -87,17 +87,17 @@ class MetricsServer:
         path = rest.partition(" ")[0].partition("?")[0]
         # a web page may have this computer ask under a name of its own (DNS rebinding)
         if any(host not in names for host in _hosts(headers)):
-            return _http(HTTPStatus.MISDIRECTED_REQUEST, "Ask by the host's address.\n")
+            return _http(HTTPStatus.MISDIRECTED_REQUEST, "Use the address of this host.\n")
         if method not in ("GET", "HEAD"):
-            return _http(HTTPStatus.METHOD_NOT_ALLOWED, "Nothing is taken here.\n")
+            return _http(HTTPStatus.METHOD_NOT_ALLOWED, "Use GET or HEAD.\n")
         if path != PATH:
             return _http(HTTPStatus.NOT_FOUND, f"The metrics are at {PATH}.\n")
         try:
             text = self._text()
         except Exception:
             # one unexpected error must not end the service
-            log.exception("the metrics were not told")
-            return _http(HTTPStatus.INTERNAL_SERVER_ERROR, "The log says what is wrong.\n")
+            log.exception("the metrics were not served")
+            return _http(HTTPStatus.INTERNAL_SERVER_ERROR, "Internal error. See the log.\n")
         return _http(HTTPStatus.OK, text, METRICS_TYPE, body=method == "GET")
 
 

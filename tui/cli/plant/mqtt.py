@@ -63,7 +63,7 @@ class MqttPublisher:
         self._news.set()
 
     async def run(self) -> None:
-        """Publish until end(); a broker that is lost, or never there, is tried on."""
+        """Publish until end(); a broker that is lost, or never connected, is retried."""
         delay, loop = TRY_AGAIN_FIRST, asyncio.get_running_loop()
         while not self._ended:
             begun = loop.time()
@@ -155,8 +155,7 @@ class MqttPublisher:
         """Say once that the broker is not there, and why."""
         if not self._trouble:
             say(
-                f"drivepanel: {self._broker.place}: {why or 'the connection is lost'}."
-                " It is tried on.",
+                f"drivepanel: {self._broker.place}: {why or 'the connection is lost'}. Retrying.",
                 err=True,
             )
         self._trouble = why or "lost"

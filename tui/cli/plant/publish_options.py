@@ -56,8 +56,8 @@ def check_drives(lines: Sequence[ServedLine]) -> None:
     for line in lines:
         if not line.devices and not line.text.casefold().startswith(SIMULATED_PREFIX):
             raise click.UsageError(
-                f"Which drives of {line.name} are read for --metrics and --mqtt?"
-                f" Write {line.name}@1,2 with their addresses."
+                f"--metrics and --mqtt need the addresses of the drives on {line.name}. Use"
+                f" {line.name}@1,2 for example."
             )
 
 
@@ -82,7 +82,7 @@ def warn_of_plain_password(broker: Broker) -> None:
     """Warn if a password is sent unencrypted."""
     if broker.password is not None and not broker.tls and not is_loopback(broker.host):
         say(
-            f"drivepanel: the password goes to {broker.place} unencrypted: mqtts:// is for TLS.",
+            f"drivepanel: the password for {broker.place} is sent unencrypted. Use mqtts://.",
             err=True,
         )
 

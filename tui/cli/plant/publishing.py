@@ -63,7 +63,7 @@ async def metrics_at(lines: Sequence[PlantLine], host: str, port: int) -> AsyncI
         host, port = await server.listen(host, port)
     except OSError as error:
         place, why = written_host_port(host, port), why_not_served(error)
-        raise Failure(f"No metrics can be served at {place}: {why}.", LINE_TROUBLE) from error
+        raise Failure(f"Metrics cannot be served at {place}: {why}.", LINE_TROUBLE) from error
     warn_of_strangers(host, port)
     try:
         yield f"http://{written_host_port(host, port)}{PATH}"

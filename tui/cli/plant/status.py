@@ -62,5 +62,6 @@ def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:
         state=drive_state(session.profile, readings),
         rate=0.0,
         contact=cycle.contact if cycle.error else "not_polled",
-        error=cycle.error or f"Device {session.device} was not asked for {now - cycle.time:.0f} s.",
+        error=cycle.error
+        or f"Device {session.device} was not polled for {now - cycle.time:.0f} s.",
     )

@@ -80,7 +80,7 @@ def line_topics(root: str, names: Iterable[str]) -> Mapping[str, str]:
     for name in names:
         topic = f"{root}/{level(name)}"
         if topic in found.values():
-            raise ValueError(f"two lines would be published under {topic}: give them names")
+            raise ValueError(f"two lines would have the topic {topic}: give them different names")
         found[name] = topic
     return found
 
@@ -124,7 +124,7 @@ def _drive(line: LineReport, drive: DriveStatus) -> DriveMessage:
             values={},
             state=None,
             direction=None,
-            error=drive.error or "No cycle has ended yet.",
+            error=drive.error or "No cycle is complete yet.",
             contact=drive.contact,
             cycle=None,
             fault=None,

@@ -111,7 +111,7 @@ def no_blocks(profile: Profile) -> str:
     function = profile.function(3)
     longest = function.max_read if function else None
     instead = (
-        f" Up to {longest} neighboring words come in one read instead."
+        f" One read returns up to {longest} adjacent words instead."
         if longest and longest > 1
         else ""
     )

@@ -56,7 +56,7 @@ def load_blocks(text: str, file: str, profile: Profile) -> dict[str, Assignment]
         if name not in blocks or not isinstance(table, dict):
             known = ", ".join(blocks) or "none"
             raise _fault(
-                file, lines, name, "", f"{profile.name} has no block {name!r}; it has: {known}."
+                file, lines, name, "", f"{profile.name} has no block {name!r}. It has {known}."
             )
         found[name] = _assignment(profile, blocks[name], table, file, lines)
     _check_end(tables, file, text, lines, sum(len(plan.raws) for plan in found.values()))
@@ -82,11 +82,12 @@ def _assignment(
 ) -> Assignment:
     for slot in table:
         if slot not in block.slots:
-            text = f"{slot!r} is not a slot of {block.name.lower()}: {', '.join(block.slots)}."
+            text = f"{slot!r} is not a slot of the {block.name.lower()}. Use"
+            text += f" {', '.join(block.slots)}."
             raise _fault(file, lines, block.id, slot, text)
     missing = [slot for slot in block.slots if slot not in table]
     if missing:
-        text = f'{missing[0]} is missing in [{block.id}]; write "none" where it is unused.'
+        text = f'{missing[0]} is missing in [{block.id}]. Write "none" for an unused slot.'
         raise _fault(file, lines, block.id, "", text)
     raws = []
     for slot in block.slots:
@@ -110,7 +111,8 @@ def _raw(profile: Profile, block: Block, value: object) -> int:
         and block.selects_by == "choice"
         and slot_target(profile, block, value) is None
     ):
-        raise MappingError(f"{value} is none of the {len(block.choices)} choices of the block.")
+        count = len(block.choices)
+        raise MappingError(f"{value} is not one of the {count} choices of the block.")
     return value
 
 

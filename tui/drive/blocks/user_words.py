@@ -64,7 +64,7 @@ def format_named(text: str) -> WordFormat:
     for format in FORMATS:
         if format == text.strip().casefold():
             return format
-    raise MappingError(f"{text!r} is not a format. Write {', '.join(FORMATS)}.")
+    raise MappingError(f"{text!r} is not a format. Use {', '.join(FORMATS)}.")
 
 
 def is_no_value(profile: Profile, words: Sequence[int]) -> bool:

@@ -73,7 +73,7 @@ def _struct(
     for key, inner in value.items():
         if key not in fields:
             faults.found.append(
-                ((*path, key), f"there is no field `{key}` here{_instead(key, list(fields))}")
+                ((*path, key), f"`{key}` is not a field of this table{_instead(key, list(fields))}")
             )
             continue
         item = _mended(fields[key].type, inner, (*path, key), faults)
@@ -98,10 +98,10 @@ def _list(shape: shapes.ListType, value: list[Any], path: TomlPath, faults: Form
             item = _invented(shape.item_type)
         kept.append(item)
     if shape.min_length and len(value) < shape.min_length:
-        faults.found.append((path, f"must hold at least {shape.min_length}"))
+        faults.found.append((path, f"must have at least {shape.min_length} entries"))
         return _ABSENT
     if shape.max_length and len(value) > shape.max_length:
-        faults.found.append((path, f"must hold at most {shape.max_length}"))
+        faults.found.append((path, f"must have at most {shape.max_length} entries"))
         return _ABSENT
     return kept
 
@@ -123,10 +123,10 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
                 return f"must be of type str (a text in quotes), not {reported}"
             if pattern and not re.search(pattern, value):
                 form = TEXT_FORMS.get(pattern, pattern)
-                return f"{value!r} has the wrong form; allowed is {form}"
+                return f"{value!r} has the wrong form; use {form}"
         case shapes.LiteralType(values=values):
             if value not in values or isinstance(value, bool):
-                return f"{value!r} is none of the values allowed here{_instead(value, values)}"
+                return f"{value!r} is not an allowed value{_instead(value, values)}"
         case _:
             return f"must be {_kind(shape)}, not {reported}"
     return ""
@@ -143,7 +143,7 @@ def _instead(wrong: object, choice: Any) -> str:
     hint = f"; did you mean {' or '.join(near)}?" if near else "."
     if len(texts) <= LISTED_SINGLY:
         return f"{hint} Allowed: {', '.join(texts)}"
-    return f"{hint} Allowed are {len(texts)}, told by `drivepanel profiles --schema`"
+    return f"{hint} `drivepanel profiles --schema` lists all {len(texts)} allowed values"
 
 
 def _kind(shape: shapes.Type) -> str:
@@ -153,7 +153,7 @@ def _kind(shape: shapes.Type) -> str:
         case shapes.DictType():
             return "a table of names by raw value"
         case shapes.ListType():
-            return f"a list of which each is {_kind(shape.item_type)}"
+            return f"a list whose entries are each {_kind(shape.item_type)}"
         case shapes.LiteralType(values=values):
             return f"one of {', '.join(map(str, values[:LISTED_SINGLY]))}"
         case shapes.IntType(ge=low, le=high):

@@ -102,7 +102,7 @@ def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> Pro
         return ProfileFileHead(head, len(_PARAMETER.findall(text)), str(error))
     head, rows = tables.get("profile", {}), tables.get("parameters", [])
     if not isinstance(head, dict) or not isinstance(head.get("id"), str):
-        return ProfileFileHead(fault="its table [profile] with an id is missing")
+        return ProfileFileHead(fault="the table [profile] with an id is missing")
     return ProfileFileHead(head, len(rows) if isinstance(rows, list) else 0)
 
 

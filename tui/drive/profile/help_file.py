@@ -61,13 +61,13 @@ def help_findings(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpP
     for place, label, hint in _hints(reported):
         for look in hint.look_at:
             if look.code not in codes:
-                yield place, f"{label}: there is no parameter {look.code!r} to look at."
+                yield place, f"{label}: look_at: there is no parameter {look.code!r}."
         for row in hint.ruled_out:
             if row.text not in (*hint.probable, *hint.check):
-                yield place, f"{label}: {row.text!r} is neither a cause nor a check of it."
+                yield place, f"{label}: ruled_out: {row.text!r} is not in probable or check."
             for code in (row.parameter, *(when.parameter for when in row.when)):
                 if code not in codes:
-                    yield place, f"{label}: there is no parameter {code!r} to rule out by."
+                    yield place, f"{label}: ruled_out: there is no parameter {code!r}."
     yield from _faults(data, reported)
     yield from _alarms(data, reported)
 

@@ -29,11 +29,13 @@ def new_profile_text(
     """
     if not IDENTIFIER.fullmatch(new_id):
         raise ProfileError(
-            f"{new_id!r} cannot be an id: small letters, digits, - and _, a letter first."
+            f"{new_id!r} is not an id. Use small letters, digits, - and _, with a letter first."
         )
     head = _HEAD.search(source)
     if head is None or not _ID.search(head[0]):
-        raise ProfileError(f"The profile {old_id} has no plain table [profile] to copy.")
+        raise ProfileError(
+            f"The profile {old_id} cannot be copied: its table [profile] has another form."
+        )
     changed = _DEMO.sub("", _ID.sub(f'id = "{new_id}"', head[0], count=1))
     text = source[: head.start()] + changed + source[head.end() :]
     if rows is not None:

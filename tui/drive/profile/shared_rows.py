@@ -127,11 +127,11 @@ def parsed(source: SourceText) -> dict[str, Any]:
 def _shared_file(own: SourceText, path: Path, packaged: Path, name: object) -> Path:
     place = f"{own.file}:{own.lines.get(('profile', 'rows_from'), 1)}"
     if not isinstance(name, str) or PurePosixPath(name).is_absolute() or ".." in Path(name).parts:
-        raise ProfileError(f"{place}: rows_from: {name!r} is not a file beside the profile.")
+        raise ProfileError(f"{place}: rows_from: {name!r} is not a file name in this folder.")
     for folder in (path.parent, packaged):
         if (found := folder / name).is_file():
             return found
-    raise ProfileError(f"{place}: rows_from: there is no file {name!r} beside the profile.")
+    raise ProfileError(f"{place}: rows_from: there is no file {name!r} in the folder.")
 
 
 def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
@@ -210,7 +210,7 @@ class _Merging:
         for code in codes:
             if code not in held:
                 line = own.lines.get(("profile", "without"), 1)
-                raise ProfileError(f"{own.file}:{line}: without: no shared row has {code!r}.")
+                raise ProfileError(f"{own.file}:{line}: without: there is no shared row {code!r}.")
         if not isinstance(rows, list):
             return
         kept = [place for place, code in enumerate(held) if code not in codes]

@@ -129,7 +129,7 @@ def _row(profile: Profile, parameter: Parameter, a: Side, b: Side) -> ComparedRo
 
 
 def _missing(side: Side) -> str:
-    return "factory setting not known" if side.texts or side.label == "factory" else "not in it"
+    return "factory setting unknown" if side.texts or side.label == "factory" else "missing"
 
 
 def _value(profile: Profile, parameter: Parameter, side: Side) -> Value | None:

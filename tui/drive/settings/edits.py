@@ -38,12 +38,12 @@ class Edit:
     @property
     def loss(self) -> str:
         """Why writing it requires consent to rounding; empty if it does not."""
-        return f"{self.code}: {self.typed} would be held as {self.text}" if self.lossy else ""
+        return f"{self.code}: {self.typed} would be rounded to {self.text}" if self.lossy else ""
 
     @property
     def remark(self) -> str:
         """Remark shown immediately: rounding and danger."""
-        held = f"{self.code}: {self.typed} is held as {self.text}." if self.rounded else ""
+        held = f"{self.code}: {self.typed} is rounded to {self.text}." if self.rounded else ""
         return f"{held} {self.warning}".strip()
 
 

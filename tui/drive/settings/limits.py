@@ -79,8 +79,8 @@ def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> di
         code, other, side = (low, high, "above") if low in edits else (high, low, "below")
         texts = [shown(profile, profile[c], after[c], after).display for c in (code, other)]
         found[code] = (
-            f"{code} = {texts[0]} would be {side} {other} = {texts[1]}: change {other} too,"
-            " or another value."
+            f"{code} = {texts[0]} would be {side} {other} = {texts[1]}. Change {other} as well, or"
+            " use another value."
         )
     found.update(_past_multiples(profile, edits, after))
     return found
@@ -102,7 +102,7 @@ def _past_multiples(
         held = shown(profile, parameter, after[code], after).display
         reported = f"{code} = {held} would be {side} {limit:f} {parameter.unit}".rstrip()
         sure = limits_are_sure(parameter)
-        doubt = "" if sure else ", a limit that no document of this family states"
+        doubt = "" if sure else "; no document of this family states this limit"
         yield code if code in edits else of.parameter, f"{reported} ({formula_of(of)}{doubt})."
 
 

@@ -18,12 +18,12 @@ def save_order(profile: Profile) -> MemoryOrder:
     storages = {p.storage for p in profile.parameters if p.access in ("rw", "rw-stopped")}
     if "eeprom" in storages and "ram-until-saved" not in storages:
         raise MemoryRefused(
-            f"{profile.name} keeps each setting in EEPROM as soon as it is written: nothing is"
-            " to be saved."
+            f"{profile.name} stores each setting in EEPROM when it is written. You do not have to"
+            " save."
         )
     raise MemoryRefused(
-        f"How {profile.name} saves settings over the line is in no document at hand: save them"
-        " at its keypad."
+        f"No available document says how {profile.name} saves settings over Modbus. Save them on"
+        " its keypad."
     )
 
 
@@ -32,6 +32,6 @@ def factory_order(profile: Profile) -> MemoryOrder:
     if (order := profile.data.memory.factory) is not None:
         return order
     raise MemoryRefused(
-        f"Which word of {profile.name} recalls the factory settings is in no document at hand:"
-        " do it at its keypad, or restore a parameter set."
+        f"No available document says which word of {profile.name} restores the factory settings."
+        " Use its keypad, or restore a parameter set."
     )

@@ -68,9 +68,9 @@ def dump_set(profile: Profile, values: ParameterSet) -> str:
     head = values.head
     known = [p for p in profile.parameters if p.code in values.raws]
     lines = [
-        "# Parameter set of a drive. To change a value by hand, write it into `value` and take",
-        "# `raw` out of that line; to leave a parameter as it is in the drive, delete its line",
-        "# and correct `parameters` at the top and at the end.",
+        "# Parameter set of a drive. To change a value by hand, edit `value` and delete `raw` in",
+        "# that line. To leave a parameter of the drive unchanged, delete its line, and correct",
+        "# `parameters` at the top and at the end.",
         "",
         f"[{SET_HEADER}]",
         f"format = {SET_FORMAT}",

@@ -144,7 +144,7 @@ class _Planner:
         value = shown(self.source_profile, parameter, raw, raws, lacking(self.source_profile, raws))
         key = f"{self.source_profile.id} {parameter.code}"
         if is_setting(self.source_profile, parameter):
-            text = f"{self.profile.name} has no parameter that surely means the same"
+            text = f"{self.profile.name} has no parameter that certainly means the same"
             self._skip(key, "no counterpart", text, value.display)
 
     def _typed(self, profile: Profile, parameter: Parameter, raw: int) -> str:
@@ -205,9 +205,9 @@ class _Planner:
             return "unverified", "no document of this family confirms its address"
         setting = line_setting(self.profile, code)
         if setting is not None and setting.role in CUTTING and not options.line_settings:
-            return "line", "it belongs to the line on which this drive is reached"
+            return "line", "it is a line setting, and would change how this drive is reached"
         if self.same_rating is False and not options.rating and rated(parameter):
-            return "rating", "it belongs to another rating or model"
+            return "rating", "it depends on the rating, and the set is of another rating or model"
         if code not in self.held.raws:
             return "absent", self.held.absent.get(code, "this drive does not report it")
         return None

@@ -138,9 +138,8 @@ def _check_whole(tables: Mapping[str, Any], text: str, count: int, fault: _Fault
         if reported != count:
             raise fault(
                 _line_of(text, name),
-                f"[{name}] states {reported} parameters, and {count} are here. If lines were"
-                " taken"
-                f" out on purpose, write parameters = {count} in [{SET_HEADER}] and in"
+                f"[{name}] states {reported} parameters, but the file has {count}. If you deleted"
+                f" lines on purpose, write parameters = {count} in [{SET_HEADER}] and in"
                 f" [{END_OF_SET}].",
             )
 
@@ -193,17 +192,17 @@ def _unquoted(key: str) -> str:
 def _entry(code: str, line: int, fields: Any, fault: _Fault) -> _Entry:
     example = f'{code} = {{ raw = 30, value = "3.0 s" }}'
     if not isinstance(fields, dict):
-        raise fault(line, f"{code} is not a parameter; write it like {example}.")
+        raise fault(line, f"{code} is not a parameter. Write it like {example}.")
     strange = sorted(set(fields) - _FIELDS)
     if strange:
-        raise fault(line, f"{code}: {strange[0]!r} is not a field here; write it like {example}.")
+        raise fault(line, f"{code}: {strange[0]!r} is not a field. Write it like {example}.")
     raw, value = fields.get("raw"), fields.get("value")
     if raw is not None and (not isinstance(raw, int) or isinstance(raw, bool)):
         raise fault(line, f"{code}: raw must be a whole number, not {raw!r}.")
     if isinstance(value, bool) or not isinstance(value, str | int | float | None):
         raise fault(line, f"{code}: value must be a text or a number.")
     if raw is None and value is None:
-        raise fault(line, f"{code} has neither raw nor value; write it like {example}.")
+        raise fault(line, f"{code} has neither raw nor value. Write it like {example}.")
     return _Entry(code, line, raw, None if value is None else str(value))
 
 
@@ -242,8 +241,8 @@ class _Resolver:
             return entry.raw
         raise self.fault(
             entry.line,
-            f"{entry.code}: raw {entry.raw} is {text}, and value says {entry.value}. Which is"
-            " meant? Take raw out of the line to keep the value, or value to keep raw.",
+            f"{entry.code}: raw {entry.raw} is {text}, but value is {entry.value}. Delete raw in"
+            " this line to use the value, or delete value to use raw.",
         )
 
     def _may_mean(self, parameter: Parameter, entry: _Entry, raws: Mapping[str, int]) -> int | None:
@@ -259,10 +258,13 @@ class _Resolver:
         except ValueRefused as error:
             raise self.fault(entry.line, str(error)) from error
         if conversion.rounded and entry.raw is not None:
-            raise self.fault(entry.line, f"{entry.code}: {entry.value} cannot be held exactly.")
+            raise self.fault(
+                entry.line,
+                f"{entry.code}: the drive cannot hold {entry.value} exactly. Use another value.",
+            )
         if conversion.rounded:
             held = shown(self.profile, parameter, conversion.raw, raws, absent).display
-            self.notes[entry.code] = f"{entry.code}: {entry.value} is held as {held}."
+            self.notes[entry.code] = f"{entry.code}: {entry.value} is rounded to {held}."
         if conversion.lossy:
             self.lossy.add(entry.code)
         return conversion.raw

@@ -101,7 +101,7 @@ def write_refusal(
         return Refusal("read-only", f"{code} can only be read.")
     if is_order(profile, parameter):
         return Refusal(
-            "order", f"{code} is a command, not a setting: give it on Monitor or with run and stop."
+            "order", f"{code} is a command, not a setting. Use Monitor, or `run` and `stop`."
         )
     if not is_verified(parameter) and code not in confirmed:
         return Refusal(
@@ -110,16 +110,16 @@ def write_refusal(
             f" {parameter.number}. Compare it with the keypad, then confirm it once.",
         )
     if needs_standstill(profile, parameter) and state not in AT_REST:
-        now = f"the drive is now {state}" if state else "its state is not known"
+        now = f"the drive is now {state}" if state else "its state is unknown"
         return Refusal(
-            "running", f"{code} is written with the motor stopped only; {now}. Stop it first."
+            "running", f"{code} can be written only with the motor stopped; {now}. Stop it first."
         )
     return None
 
 
 _STORAGE = {
     "ram": "lost at power-off",
-    "eeprom": "kept at once (EEPROM)",
+    "eeprom": "stored at once (EEPROM)",
     "ram-until-saved": "lost at power-off until saved",
     "unknown": "",
 }
@@ -141,7 +141,7 @@ def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
     setting = line_setting(profile, parameter.code)
     found = (
         "stopped only" if needs_standstill(profile, parameter) else "",
-        "in force after a reset of the drive" if later else "",
+        "takes effect after a reset of the drive" if later else "",
         _STORAGE[parameter.storage],
         "changes the line itself" if setting is not None and setting.role in CUTTING else "",
         "" if is_verified(parameter) else "unverified",
@@ -172,9 +172,8 @@ def never_set(profile: Profile, parameter: Parameter, raw: int) -> str:
     if not any(r.never_set and r.raw == raw for r in watch.reactions):
         return ""
     return (
-        f"{parameter.code} = {raw} is never written by Drive Panel: a motor would run on when the"
-        " line is"
-        " lost, unnoticed. If it must be set, use the keypad."
+        f"{parameter.code} = {raw} is never written by Drive Panel: after a communication loss, a"
+        " motor would run on unnoticed. If you need this value, set it on the keypad."
     )
 
 
@@ -183,9 +182,9 @@ def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
     watch = profile.data.communication_fault
     if watch is None:
         return ""
-    lost = "a motor then runs on when the line is lost"
+    lost = "a motor then runs on after a communication loss"
     if parameter.code == watch.timeout and raw == watch.off:
-        return f"This switches the drive's watch over the line off: {lost}."
+        return f"This switches the communication timeout of the drive off: {lost}."
     if parameter.code == watch.reaction:
         reaction = next((r for r in watch.reactions if r.raw == raw), None)
         if reaction is not None and reaction.motor_keeps_running:

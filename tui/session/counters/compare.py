@@ -21,8 +21,8 @@ STRANGE = 0x8000
 than this program sent counts as a reset."""
 
 COUNTED_ANEW = (
-    "The drive has restarted counting: it was switched off, or its counters were reset. It is"
-    " compared from there on."
+    "The drive restarted its counters: it was switched off, or they were reset. The comparison"
+    " starts again from there."
 )
 
 DifferenceKind = Literal[
@@ -128,8 +128,8 @@ def differences(found: Comparison) -> list[Difference]:
     reported = [Difference("counted-anew", 0, COUNTED_ANEW)] if found.anew else []
     if found.counts_this_line is False:
         text = (
-            f"{_frames(found.answered.low)} were answered and {found.frames} counted: these"
-            " counters are those of another port than this line leads to, or were reset."
+            f"The drive answered {_frames(found.answered.low)}, but counted {found.frames}. So"
+            " these counters belong to another port of the drive, or were reset."
         )
         return [*reported, Difference("another-port", found.answered.low - found.frames, text)]
     return [*reported, *_differences(found)]
@@ -141,16 +141,15 @@ def _differences(found: Comparison) -> Iterator[Difference]:
         yield Difference(
             "never-arrived",
             lost,
-            f"{_frames(lost)} were sent that the drive never counted: lost on the way to it, or"
-            " damaged so that it did not see its address. Look at its connector, the polarity, the"
-            " termination.",
+            f"The drive did not count {_frames(lost)} that were sent: lost on the way to it, or"
+            " with a damaged address. Check its connector, the polarity and the termination.",
         )
     if damaged > 0:
         yield Difference(
             "damaged-there",
             damaged,
-            f"{_frames(damaged)} reached the drive damaged: noise on the way to it. Look at the"
-            " shield, the termination, the polarization, the motor cable beside it.",
+            f"The drive received {_frames(damaged)} damaged: noise on the way to it. Check the"
+            " shield, the termination, the polarization, and motor cables close to the line.",
         )
     # foreign frames may have been answered or not, so they do not count
     missed = min(frames, found.sent.low) - damaged - found.answered.high
@@ -158,15 +157,15 @@ def _differences(found: Comparison) -> Iterator[Difference]:
         yield Difference(
             "not-answered",
             missed,
-            f"The drive saw {_frames(missed)} whose answer we did not get: lost or damaged on the"
-            " way back, or later than we waited.",
+            f"The drive received {_frames(missed)} whose replies did not arrive: lost or damaged on"
+            " the way back, or later than the timeout.",
         )
     if (foreign := frames - found.sent.high) > 0:
         yield Difference(
             "not-from-here",
             foreign,
             f"The drive counted {_frames(foreign)} more than this program sent: another master"
-            " polls it, or a gateway repeats.",
+            " polls it, or a gateway repeats requests.",
         )
 
 
@@ -178,14 +177,14 @@ def own_differences(ours: DeviceCounters) -> list[Difference]:
     found = []
     if ours.checksum:
         text = (
-            f"{_frames(ours.checksum)} came back damaged: noise, two devices that answer at once,"
+            f"{_frames(ours.checksum)} came back damaged: noise, two devices that answer together,"
             " or a wrong format."
         )
         found.append(Difference("damaged-here", ours.checksum, text))
     if ours.timeouts:
         text = (
-            f"{_frames(ours.timeouts)} went unanswered. If they were lost on the way to the"
-            " drive or on the way back, only counters of the drive would show."
+            f"{_frames(ours.timeouts)} got no reply. Only counters in the drive could show if they"
+            " were lost on the way there or on the way back."
         )
         found.append(Difference("no-answer", ours.timeouts, text))
     return found

@@ -54,7 +54,7 @@ def stray_difference(
     seen = ", ".join(f"{number} {text}" for number, text in kinds if number) or LIKELY
     master = "" if tcp or not (heard := overheard(frames, since)).requests else f" {heard.text}"
     whole = "1 frame answers" if count == 1 else f"{count} frames answer"
-    text = f"{whole} no program's request: {seen}.{master} drivepanel why names the cause."
+    text = f"{whole} no program's request: {seen}.{master} Find the cause with `drivepanel why`."
     return [Difference("strays", count, text)]
 
 
@@ -113,10 +113,8 @@ class CountersNow:
         comparison = self.compared
         if comparison is None:
             rest = "" if self.drive else " The drive reports no counters of its own."
-            return f"Frames sent: {self.since.requests}; none was lost.{rest}"
-        return (
-            f"Frames the drive counted: {comparison.frames}, all sent by this program and answered."
-        )
+            return f"Frames sent: {self.since.requests}. None was lost.{rest}"
+        return f"Frames counted by the drive: {comparison.frames}. All were sent here and answered."
 
 
 @dataclass(slots=True, eq=False)
@@ -180,7 +178,7 @@ class CounterWatch:
         if why := self.session.contradiction:
             raise RequestRefused(f"Not reset: {why}")
         device, line = self.session.device, self.session.line
-        answer = "ended on the way: not known whether it was taken"
+        answer = "ended before the reply, may have taken effect"
         try:
             await line.diagnose(device, RESET, priority=Priority.OPERATOR_WRITE)
             answer = "ok"

@@ -20,7 +20,7 @@ from .started import StartedMotors
 log = logging.getLogger(__name__)
 
 STOPPED_ELSEWHERE = (
-    "was stopped by another program: a client commands it again once it has sent a stop itself"
+    "was stopped by another program: a client must send a stop before it can command the drive"
 )
 
 
@@ -76,7 +76,7 @@ class GatewayCommanding:
             self._signs[device] = REAL_CLOCK.monotonic()
             self._commanded.setdefault(device, set()).add(client)
         if before not in (None, client):
-            text = f"Modbus TCP client {client} commands this drive now, as client {before} did."
+            text = f"Modbus TCP client {client} now commands this drive, instead of {before}."
             log.warning("drive %s: %s", device, text)
             self._line.facts.tell_all(device, text)
         return ""
@@ -119,9 +119,8 @@ class GatewayCommanding:
         for device in left:
             self._release(device)
             text = (
-                f"Modbus TCP client {client}, which commanded this drive, has disconnected: its"
-                " motor follows"
-                " the last command."
+                f"Modbus TCP client {client}, which commanded this drive, has disconnected. The"
+                " motor follows the last command."
             )
             log.warning("drive %s: %s", device, text)
             self._line.facts.tell_all(device, text)

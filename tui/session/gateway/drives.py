@@ -145,7 +145,7 @@ class GatewayDrives:
             try:
                 raws[code] = await self._read_raw(session, code, priority, age)
             except LineError as error:
-                log.info("%s, which decides about a stop, was not read: %s", code, error)
+                log.info("%s, which selects the stop word, was not read: %s", code, error)
         return raws
 
     async def _read_raw(
@@ -189,7 +189,7 @@ class GatewayDrives:
     def _begin(self, device: int) -> asyncio.Task[DriveSession | None]:
         loop = asyncio.get_running_loop()
         self._requested[device] = self._losses, loop.time()
-        task = loop.create_task(self._identify(device), name=f"who is {device}")
+        task = loop.create_task(self._identify(device), name=f"identify {device}")
         self._tasks[device] = task
         task.add_done_callback(lambda done: self._ended(device, done))
         return task
@@ -197,7 +197,7 @@ class GatewayDrives:
     def _ended(self, device: int, task: asyncio.Task[DriveSession | None]) -> None:
         self._tasks.pop(device, None)
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.info("who device %s is was not found out: %s", device, error)
+            log.info("device %s was not identified: %s", device, error)
 
     async def _identify(self, device: int) -> DriveSession | None:
         named, losses = self._named.get(device), self._losses

@@ -36,7 +36,7 @@ def allowed_codes(text: str) -> frozenset[str]:
     """Parse typed codes, separated by commas, or `all` in any case. Raises RulesError."""
     codes = frozenset(part.strip() for part in text.split(",") if part.strip())
     if not codes:
-        raise RulesError(f"{text!r} has no code. Name codes such as ACC,DEC, or all.")
+        raise RulesError(f"{text!r} has no code. Use codes such as ACC,DEC, or all.")
     return frozenset(ALL if code.casefold() == ALL else code for code in codes)
 
 
@@ -54,7 +54,7 @@ def as_written(codes: frozenset[str]) -> frozenset[str]:
                 known[parameter.code.casefold()].add(parameter.code)
     if strange := sorted(code for code in codes - {ALL} if code.casefold() not in known):
         raise RulesError(
-            f"No family has a parameter {', '.join(strange)}. Name codes such as ACC,DEC, or all."
+            f"No family has a parameter {', '.join(strange)}. Use codes such as ACC,DEC, or all."
         )
     return frozenset(own for code in codes for own in known.get(code.casefold(), {code}))
 
@@ -78,16 +78,16 @@ def unit_map(lines: int, texts: Sequence[str]) -> Mapping[int, tuple[int, int]]:
         match = _MAPPED.fullmatch(text.strip())
         if match is None:
             raise RulesError(
-                f"{text!r} is not a mapping. Write IDS=LINE[@DEVICE], for example 101-131=2@1."
+                f"{text!r} is not a mapping. Use IDS=LINE[@DEVICE], for example 101-131=2@1."
             )
         first, last = int(match[1]), int(match[2] or match[1])
         line, device = int(match[3]), int(match[4] or match[1])
         if not 1 <= line <= lines:
-            raise RulesError(f"{text!r}: there is no line {line}. Lines named: {lines}.")
+            raise RulesError(f"{text!r}: there is no line {line}. Lines given: {lines}.")
         if not 1 <= first <= last <= 255 or not 1 <= device <= HIGHEST_DEVICE - (last - first):
-            raise RulesError(f"{text!r}: ids are 1 to 255, devices 1 to {HIGHEST_DEVICE}.")
+            raise RulesError(f"{text!r}: use ids 1 to 255, and devices 1 to {HIGHEST_DEVICE}.")
         for offset in range(last - first + 1):
             if first + offset in found:
-                raise RulesError(f"{text!r}: id {first + offset} is named twice.")
+                raise RulesError(f"{text!r}: id {first + offset} is given twice.")
             found[first + offset] = line - 1, device + offset
     return found

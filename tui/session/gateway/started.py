@@ -94,7 +94,7 @@ class StartedMotors:
         if self._looks.get(device) is task:
             del self._looks[device]
         if not task.cancelled() and (error := task.exception()) is not None:
-            log.error("device %s was not seen at standstill: %r", device, error)
+            log.error("standstill of device %s was not seen: %r", device, error)
 
     async def _until_standing(self, device: int) -> None:
         session = self._sessions[device]
@@ -106,7 +106,7 @@ class StartedMotors:
             except LineClosed:
                 return
             except LineError as error:
-                log.info("device %s was not seen at standstill: %s", device, error)
+                log.info("standstill of device %s was not seen: %s", device, error)
             await session.clock.sleep(STANDSTILL_LOOK)
 
     async def end(self) -> StopSummary | None:

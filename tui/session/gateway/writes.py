@@ -47,7 +47,7 @@ from .rules import GatewayRules
 
 log = logging.getLogger(__name__)
 
-ENDED_BEFORE_ANSWER = "serve ended: not known whether it was taken"
+ENDED_BEFORE_ANSWER = "serve ended, may have taken effect"
 
 
 class GatewayWrite:
@@ -111,7 +111,7 @@ class GatewayWrite:
         try:
             await Reader(self._session).read(codes, priority=Priority.OPERATOR_WRITE)
         except LineError as error:
-            log.info("what decides about a write was not read: %s", error)
+            log.info("the values that a write depends on were not read: %s", error)
             return {}
         return self._session.image.fresh(JUST_READ)
 
@@ -122,12 +122,12 @@ class GatewayWrite:
             self._refuse(BUSY, why)
         drive = await self._line.drives.found(self._session.device)
         if drive is None or drive.profile.id != self._session.profile.id:
-            self._refuse(BUSY, "another drive answers now")
+            self._refuse(BUSY, "another drive answers at this address")
         if any(word.kind is WordKind.UNKNOWN for word in words):
             lacking = [word.address for word in words if word.kind is WordKind.UNKNOWN]
             self._refuse(ILLEGAL_FUNCTION, f"no parameter can be written at {lacking}")
         if self._commands and not self._rules.commands:
-            self._refuse(ILLEGAL_FUNCTION, "commands are not allowed: --allow-commands")
+            self._refuse(ILLEGAL_FUNCTION, "commands are not allowed; use --allow-commands")
         settings = [word for word in words if word.kind is WordKind.SETTING]
         for setting in settings:
             why = setting_refusal(self._session.profile, setting, self._rules.writes)
@@ -157,7 +157,7 @@ class GatewayWrite:
         if still:
             motion = read_chart(profile, raws).motion
             if motion not in AT_REST:
-                self._refuse(BUSY, f"written with the motor stopped only; the drive is {motion}")
+                self._refuse(BUSY, f"allowed only with the motor stopped; the drive is {motion}")
 
     def _refuse(self, code: int, why: str) -> NoReturn:
         who = f"device {self._session.device}, Modbus TCP client {self._client}"
@@ -265,7 +265,7 @@ class GatewayWrite:
         if self._line.pending.void(self._write):
             return "Not sent: a stop came after it."
         if self._request.stale:
-            return "Not sent: serve was suspended when it came, and it is too late now."
+            return "Not sent: it arrived while serve was suspended, and is too old."
         gone = self._commands and self._request.client.left
         return "Not sent: its client has disconnected and cannot stop the motor." if gone else ""
 

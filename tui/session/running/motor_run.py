@@ -187,8 +187,8 @@ class MotorRun:
         """The reason why the motor no longer runs."""
         if fault := latest.state.fault:
             return MotorTripped(
-                f"Device {self.console.device} tripped: {fault.code}, {fault.name}. Look at the"
-                " machine; reset it when its cause is gone."
+                f"Device {self.console.device} tripped: {fault.code}, {fault.name}. Check the"
+                " machine, remove the cause, then reset the fault."
             )
         how = "by the drive or by another source"
         if by_others := self._stop_of_others():
@@ -244,8 +244,8 @@ class MotorRun:
                 if not reported:
                     reported = True
                     self.observer.warn(
-                        f"NOT STOPPED yet: {latest.error}\n{self._left_alone()} It is stopped as"
-                        " soon as it answers; until then stop it at the machine."
+                        f"NOT STOPPED yet: {latest.error}\n{self._left_alone()} The motor is"
+                        " stopped as soon as the drive answers. Until then, stop it at the machine."
                     )
             elif not latest.error and latest.time > requested:
                 return bad

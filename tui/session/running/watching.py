@@ -67,7 +67,10 @@ async def learned_timeout(fleet: Fleet, console: DriveConsole) -> TimeoutWatch |
     end = asyncio.get_running_loop().time() + within
     while console.session in fleet.line_watch.unread():
         if asyncio.get_running_loop().time() > end:
-            raise NotLearned(f"{rules.timeout} could not be learnt.")
+            raise NotLearned(
+                f"The communication timeout {rules.timeout} of device {console.device} could not be"
+                " read in time."
+            )
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
     return fleet.line_watch.watch(console.device)
 

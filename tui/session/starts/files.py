@@ -81,7 +81,7 @@ class StartFiles:
                 path.unlink(missing_ok=True)
                 removed = True
             except OSError as error:
-                log.error("the record of a start, %s, cannot be removed: %s", path, error)
+                log.error("the start record %s cannot be removed: %s", path, error)
         if removed:
             with suppress(OSError):
                 sync_folder(self.folder)
@@ -96,7 +96,7 @@ class StartFiles:
         except FileNotFoundError:
             return
         except OSError as error:
-            log.error("the records of starts in %s cannot be read: %s", self.folder, error)
+            log.error("the start records in %s cannot be read: %s", self.folder, error)
             return
         for path in sorted(paths):
             if (record := _read(path)) is not None:
@@ -136,9 +136,9 @@ def _read(path: Path) -> StartRecord | None:
     except FileNotFoundError:
         return None  # its program has just removed it
     except OSError as error:
-        log.error("the record of a start, %s, cannot be read: %s", path, error)
+        log.error("the start record %s cannot be read: %s", path, error)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        log.error("the record of a start, %s, is damaged and set aside: %s", path, error)
+        log.error("the start record %s is damaged and was renamed: %s", path, error)
         with suppress(OSError):
             path.replace(path.with_suffix(".damaged"))
     return None
@@ -186,7 +186,9 @@ class StartFolders:
             try:
                 shared.write_record(record, wanted)
             except OSError as error:
-                log.error("the start of drive %s is not told the group: %s", record.device, error)
+                log.error(
+                    "the group has no record of the start of drive %s: %s", record.device, error
+                )
 
     def remove(self, unwanted: Callable[[StartRecord], bool]) -> None:
         """Take away records; what cannot be removed is logged."""

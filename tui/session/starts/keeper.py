@@ -205,7 +205,9 @@ class StartKeeper:
         """Record the start of an earlier program as this program's. Raises StartNotRecorded."""
         record = self._left_of(session)
         if record is None:
-            raise NothingToTakeOver("No earlier program has recorded a start of this drive.")
+            raise NothingToTakeOver(
+                f"Nothing to take over: no earlier program started drive {session.device}."
+            )
         mine = self._starts.taken_over(
             record, session.line_text, program=self._program, left_running=self.left_running
         )

@@ -124,9 +124,9 @@ class StartNotRecorded(DriveError):
     def __init__(self, device: int, folder: Path, reason: str) -> None:
         self.device, self.folder, self.reason = device, folder, reason
         super().__init__(
-            f"The start of drive {device} was not recorded in {folder}: {reason}. Without a record "
-            "it is not known after a crash which program started the motor. Make the folder "
-            "writable, or name another one in DRIVEPANEL_STATE."
+            f"The start of drive {device} was not recorded in {folder}: {reason}. Without a record,"
+            " nothing shows after a crash which program started the motor. Make the folder"
+            " writable, or name another one in DRIVEPANEL_STATE."
         )
 
 

@@ -34,8 +34,8 @@ def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             if not order.words or not (order.parameter or chart.command):
                 yield (
                     here,
-                    f"order {order.id}: nothing to write, or nowhere: it needs words, and a"
-                    " parameter or the chart's command.",
+                    f"order {order.id}: it needs words, and a parameter or the command of its"
+                    " chart.",
                 )
         if chart.runs_in is not None and chart.runs_in not in {
             state.id for state in chart.states if state.kind == "running"
@@ -60,9 +60,9 @@ def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 if not before.mask & ~state.mask and state.value & before.mask == before.value:
                     yield (
                         at,
-                        f"chart {chart.id}: state {state.id} is never seen: {before.id} above it"
-                        " fits each of its words, and the first that fits counts. Put it before,"
-                        " or give the other a wider mask.",
+                        f"chart {chart.id}: state {state.id} is never reached: {before.id} above"
+                        " it fits the same words, and the first that fits counts. Move it before"
+                        f" {before.id}, or give {before.id} a wider mask.",
                     )
                     break
 
@@ -77,13 +77,13 @@ def stops_always(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if not ways:
             yield (
                 at,
-                f"chart {chart.id}: it can run a motor and has no stop: add an order with the id"
+                f"chart {chart.id}: it can run a motor but has no stop. Add an order with the id"
                 f" {', '.join(SURE_STOPS)}.",
             )
         elif not any(not order.states and not order.when for order in ways):
             yield (
                 at,
-                f"chart {chart.id}: no stop holds in every state: one of its orders"
+                f"chart {chart.id}: no stop applies in every state. One of its orders"
                 f" {', '.join(dict.fromkeys(order.id for order in ways))} must have neither"
                 " states nor when.",
             )
@@ -143,8 +143,8 @@ def chart_words_in_reach(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             if order.id in SURE_STOPS and access.get(code) == "rw-stopped":
                 yield (
                     (*at, "orders", place),
-                    f"order {order.id}: {code} can be written only at rest (access rw-stopped)."
-                    " The word of a stop must have access rw or w.",
+                    f"order {order.id}: {code} can be written only with the motor stopped (access"
+                    " rw-stopped). The word of a stop must have access rw or w.",
                 )
 
 
@@ -157,15 +157,15 @@ def running(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if "running" not in kinds:
             yield (
                 ("charts", index, "states"),
-                f"chart {chart.id}: it can run a motor and has no state of the kind running.",
+                f"chart {chart.id}: it can run a motor but has no state of the kind running.",
             )
         if chart.runs_in is not None:
             for state in chart.states:
                 if state.kind in NOT_TURNING and not _leads(chart, state.id, chart.runs_in):
                     yield (
                         ("charts", index, "runs_in"),
-                        f"chart {chart.id}: no command leads from {state.id} to {chart.runs_in}:"
-                        " a transition with a command is missing.",
+                        f"chart {chart.id}: no command leads from {state.id} to {chart.runs_in}."
+                        " Add a transition with a command.",
                     )
     for index, chart in enumerate(data.charts):
         led_to = {step.target for step in chart.transitions}
@@ -186,7 +186,7 @@ def faults_seen(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if kinds != {"unknown"} and "fault" not in kinds:
             yield (
                 ("charts", index, "states"),
-                f"chart {chart.id}: a drive in fault would look healthy: add a state of the kind"
+                f"chart {chart.id}: a drive in fault would look healthy. Add a state of the kind"
                 " fault, or faults.parameter with the word that holds the fault.",
             )
 
@@ -197,8 +197,8 @@ def conditions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     for index in without[1:]:
         yield (
             ("charts", index, "id"),
-            f"chart {data.charts[index].id}: it never holds, since"
-            f" {data.charts[without[0]].id} above it has no condition either: add when.",
+            f"chart {data.charts[index].id}: it is never used, because"
+            f" {data.charts[without[0]].id} above it has no condition either. Add when.",
         )
 
 

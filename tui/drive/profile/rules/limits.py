@@ -27,12 +27,12 @@ def circles(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             key = "max_from" if parameter.max_from else "min_from"
             yield (
                 ("parameters", index, key),
-                f"parameter {parameter.code}: its limits go round in a circle: {' <= '.join(way)}.",
+                f"parameter {parameter.code}: its limits form a circle: {' <= '.join(way)}.",
             )
         if way := _circle(follows, parameter.code):
             yield (
                 ("parameters", index, "scale_by"),
-                f"parameter {parameter.code}: its scale follows itself: {' by '.join(way)}.",
+                f"parameter {parameter.code}: its scale depends on itself: {' by '.join(way)}.",
             )
 
 
@@ -101,7 +101,7 @@ def _refused(parameter: Parameter, raw: int, names: dict[str, str]) -> str:
         return f"does not fit {parameter.type}: {low} to {high}."
     if names and is_enumeration(parameter):
         reported = ", ".join(f"{key} {text}" for key, text in names.items())
-        return f"is none of its values: {reported}."
+        return f"is not one of its values: {reported}."
     least, most = raw_range(parameter)
     if not least <= raw <= most:
         return f"is outside its limits, {least} to {most}."
@@ -122,8 +122,8 @@ def factory_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if by.raws.get(str(factory.get(by.parameter))) != parameter.factory:
             yield (
                 place,
-                f"parameter {parameter.code}: factory is not what factory_by gives for the"
-                f" factory setting of {by.parameter}.",
+                f"parameter {parameter.code}: factory differs from the value of factory_by for"
+                f" the factory setting of {by.parameter}.",
             )
 
 

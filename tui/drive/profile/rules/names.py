@@ -166,7 +166,7 @@ def own_id(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """The id is none of the words of `drivepanel profiles`."""
     if data.profile.id in TAKEN_IDS:
         taken = ", ".join(sorted(TAKEN_IDS))
-        yield ("profile", "id"), f"{data.profile.id!r} cannot be an id; nor can {taken}."
+        yield ("profile", "id"), f"{data.profile.id!r} is reserved, as are {taken}."
 
 
 def groups_in_use(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:

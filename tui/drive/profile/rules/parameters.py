@@ -16,7 +16,7 @@ def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Codes, quantities, ids and raw codes that occur twice."""
     yield from _twice(
         ((("parameters", n, "code"), p.code) for n, p in enumerate(data.parameters)),
-        "code {} is already that of a parameter above; each needs its own.",
+        "code {} is already used by a parameter above; each needs its own.",
     )
     seen: dict[str, str] = {}
     for index, parameter in enumerate(data.parameters):
@@ -25,8 +25,8 @@ def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if parameter.quantity in seen:
             yield (
                 ("parameters", index, "quantity"),
-                f"parameter {parameter.code}: {parameter.quantity} is already "
-                f"{seen[parameter.quantity]}; a quantity has one parameter at most.",
+                f"parameter {parameter.code}: quantity {parameter.quantity} already belongs to"
+                f" {seen[parameter.quantity]}; a quantity has one parameter at most.",
             )
         seen.setdefault(parameter.quantity, parameter.code)
     yield from _twice(
@@ -35,17 +35,17 @@ def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     )
     yield from _twice(
         ((("faults", "codes", n, "raw"), f.raw) for n, f in enumerate(data.faults.codes)),
-        "fault {} is there twice; a raw code means one fault.",
+        "fault {} occurs twice; a raw code means one fault.",
     )
     for table in ("sources", "enumerations", "charts", "blocks", "control_sources"):
         rows = getattr(data, table)
         yield from _twice(
             (((table, n, "id"), row.id) for n, row in enumerate(rows)),
-            "id {} is there twice in " + table + ".",
+            "id {} occurs twice in " + table + ".",
         )
     yield from _twice(
         ((("groups", n, "name"), g.name) for n, g in enumerate(data.groups)),
-        "group {!r} is there twice.",
+        "group {!r} occurs twice.",
     )
 
 
@@ -73,12 +73,12 @@ def _faults_of(
     yield from _range_faults(parameter, enumerations)
     yield from _shape_faults(parameter)
     if set(parameter.scale) <= {"0", "."}:
-        yield "scale", "scale is 0; one count must be worth something."
+        yield "scale", "scale must not be 0."
     if parameter.enumeration and parameter.enumeration not in enumerations:
         known = ", ".join(enumerations) or "none"
         yield (
             "enumeration",
-            f"there is no enumeration {parameter.enumeration!r}; there are: {known}.",
+            f"there is no enumeration {parameter.enumeration!r}. Known: {known}.",
         )
     for key, source in _sources_of(parameter):
         words = source.split()
@@ -86,7 +86,7 @@ def _faults_of(
             known = ", ".join(sources) or "none, add a table [[sources]]"
             yield (
                 key,
-                f"source {source!r} does not begin with the id of a source; ids: {known}.",
+                f"source {source!r} does not begin with the id of a source. Known: {known}.",
             )
     yield from _number_keys("values", parameter.values)
     if parameter.scale_by:
@@ -97,7 +97,7 @@ def _faults_of(
         yield from _number_keys("unit_by", parameter.unit_by.units)
     for number, times in Counter(bit.bit for bit in parameter.bits).items():
         if times > 1:
-            yield "bits", f"a bit is named twice: {number}."
+            yield "bits", f"bit {number} occurs twice."
 
 
 def _sources_of(parameter: Parameter) -> Iterator[tuple[str, str]]:
@@ -136,13 +136,13 @@ def _shape_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
         if long or parameter.type != "uint16":
             yield "type", f"a field of a register (mask, shift) is uint16, not {parameter.type}."
         if parameter.mask << parameter.shift > 0xFFFF:
-            yield "mask", "mask, shifted up again, runs past bit 15 of the word."
+            yield "mask", "mask, shifted left by shift, exceeds bit 15 of the word."
         if parameter.mask & (parameter.mask + 1):
-            yield "mask", "mask must be ones without a gap, such as 1, 3, 7, 15."
+            yield "mask", "mask must be adjacent ones from bit 0, such as 1, 3, 7, 15."
     if parameter.function == 4 and parameter.access != "r":
         yield "function", "an input register (function 4) can only be read: access must be r."
     if parameter.address + (2 if long else 1) > 0x10000:
-        yield "address", "runs past address 65535."
+        yield "address", "exceeds address 65535."
 
 
 def _number_keys(key: str, names: dict[str, object] | dict[str, str]) -> Iterator[tuple[str, str]]:

@@ -30,15 +30,15 @@ def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
     if parameter.type.endswith("32") or other.type.endswith("32"):
         pair = parameter if parameter.type.endswith("32") else other
         return (
-            f"address {address} is also in {other.code}: {pair.code} is {pair.type} and takes"
+            f"address {address} also belongs to {other.code}: {pair.code} is {pair.type} and uses"
             f" {pair.address} and {pair.address + 1}."
         )
     bits, others = (p.mask << p.shift for p in (parameter, other))
     if not bits & others:
         return ""
     if bits == others == 0xFFFF:
-        return f"address {address} is already that of {other.code}; fields need mask and shift."
-    return f"bits 16#{bits & others:04X} of address {address} are also those of {other.code}."
+        return f"address {address} already belongs to {other.code}; fields need mask and shift."
+    return f"bits 16#{bits & others:04X} of address {address} also belong to {other.code}."
 
 
 def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
@@ -46,14 +46,14 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     codes = {function.code for function in data.functions}
     read_by = {parameter.function for parameter in data.parameters}
     if 3 not in codes and (3 in read_by or 4 not in codes):
-        yield ("functions",), "function 3 is missing: nothing could be read."
+        yield ("functions",), "function 3 is missing, so nothing can be read."
     writes = codes & {6, 16}
     for index, parameter in enumerate(data.parameters):
         place = ("parameters", index)
         if parameter.function == 4 and 4 not in codes:
             yield (
                 (*place, "function"),
-                f"parameter {parameter.code}: function 4 is not among the functions: add it.",
+                f"parameter {parameter.code}: function 4 is not among the functions. Add it.",
             )
         if parameter.access == "r" or parameter.forbidden:
             continue
@@ -61,13 +61,13 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             yield (
                 (*place, "access"),
                 f"parameter {parameter.code}: two words are written by function 16, which is not"
-                " among the functions: add it, or set access r.",
+                " among the functions. Add it, or set access r.",
             )
         elif not writes:
             yield (
                 (*place, "access"),
-                f"parameter {parameter.code}: neither function 6 nor 16 is among the functions:"
-                " nothing can be written.",
+                f"parameter {parameter.code}: it can be written only by function 6 or 16, and"
+                " neither is among the functions. Add one, or set access r.",
             )
 
 
@@ -84,7 +84,7 @@ def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             if code in fields:
                 yield (
                     place,
-                    f"chart {chart.id}: {code} is some bits of a word; a command is a whole word.",
+                    f"chart {chart.id}: {code} is a part of a word; a command is a whole word.",
                 )
 
 
@@ -111,7 +111,7 @@ def sizes(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if block.address + most > 0x10000:
             yield (
                 (*at, "address"),
-                f"block {block.id}: {most} words from {block.address} run past address 65535.",
+                f"block {block.id}: {most} words from {block.address} exceed address 65535.",
             )
 
 
