@@ -20,7 +20,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from .programs import PATIENCE
-from .sources import ROOT, modules, nodes_of, tree_of
+from .sources import PACKAGE, ROOT, modules, nodes_of, tree_of
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 CI = ROOT / ".ci" / "run"
@@ -84,6 +84,30 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
         name.removesuffix(".__init__") for name in sources.values() if name.endswith(".__init__")
     )
     assert circle(trees, packages) == [], "move what both need into a module below them"
+
+
+def test_each_module_is_imported_or_run() -> None:
+    """Commands and registrations are imported by the names that lists have."""
+    from tui.cli.command_index import COMMANDS
+    from tui.screens.keys.screens import PACKAGES
+
+    by_name = {f"tui.screens.{package}.registration" for package in PACKAGES}
+    by_name |= {f"tui.cli.commands.{module}" for module, _ in COMMANDS.values()}
+    by_name |= {"tui.__main__", "tui.keeper.__main__", "tui.cli.derived", "tui.screens.keys.pages"}
+    by_name.add("tui.bus.fake")  # for tests of scripts
+    paths = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): path
+        for path in modules()
+        if path.name != "__init__.py"
+    }
+    names = frozenset(paths)
+    found: set[str] = set()
+    for name, path in paths.items():
+        found.update({*imported(tree_of(path), name.rpartition(".")[0], names)} - {name})
+    for path in (PACKAGE / "__init__.py", *PACKAGE.rglob("__init__.py")):
+        package = ".".join(path.parent.relative_to(ROOT).parts)
+        found.update(imported(tree_of(path), package, names))
+    assert sorted(names - found - by_name) == [], "take it out: the program does not reach it"
 
 
 @pytest.mark.parametrize(
