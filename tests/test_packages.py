@@ -16,8 +16,8 @@ import click
 import pytest
 
 from hatch_build import addresses, as_on_a_package_page
+from tui.cli.derived import _paragraphs, _text, man_page
 from tui.cli.main import main
-from tui.cli.man_page import _paragraphs, _text, man_page
 
 from .programs import PATIENCE
 

@@ -76,7 +76,7 @@ DEFECTS = (
     ),
     Defect(
         "counters-reset-unarmed",
-        "tui/screens/frames/counter_keys.py",
+        "tui/screens/frames/screen.py",
         "Task(self._reset_drive, owner=self.console), stamp",
         "Task(self._reset_drive, armed=False)",
         "A drive is written to although its arming ended while a question was open.",
@@ -151,7 +151,7 @@ DEFECTS = (
     ),
     Defect(
         "long-name-ends-the-panel",
-        "tui/screens/dialogs/files.py",
+        "tui/screens/dialogs/ask.py",
         "except OSError as error:",
         "except FileExistsError as error:",
         "Pasting a long text as a file name ends the panel and its motors.",

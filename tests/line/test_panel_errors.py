@@ -33,22 +33,22 @@ SCREENS = {
 }
 DIALOGS = {
     "Ask": "dialogs.ask",
-    "BundleScreen": "dialogs.bundle",
+    "BundleScreen": "bundle",
     "Confirm": "dialogs.confirm",
     "Leave": "dialogs.leave",
-    "Palette": "dialogs.palette",
+    "Palette": "choosing",
     "PickFile": "dialogs.pick_file",
-    "WhyScreen": "dialogs.why",
+    "WhyScreen": "why",
     "HelpScreen": "keys.help",
-    "OptionsScreen": "command.options",
+    "OptionsScreen": "command.command_keys",
     "PickWord": "command.teaching",
     "PickParameter": "blocks.pick_parameter",
     "EditNumber": "parameters.edit_value",
     "PickValue": "parameters.edit_value",
     "EditBits": "parameters.edit_value",
-    "Results": "parameters.results",
-    "RestQuestion": "parameters.results",
-    "Skipped": "parameters.skipped",
+    "Results": "parameters.write_keys",
+    "RestQuestion": "parameters.write_keys",
+    "Skipped": "parameters.set_keys",
 }
 """By class, the module below `tui.screens`."""
 PLACES = {

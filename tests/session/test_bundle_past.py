@@ -11,8 +11,8 @@ from tests.bus.peer import PtyPeer, honest
 from tui.bus.api import Frame
 from tui.bus.fake import FakeLine
 from tui.bus.link import parse_link
+from tui.session.bundle.drive_parts import past_parts
 from tui.session.bundle.parts import PartResult, collect_parts
-from tui.session.bundle.past_parts import past_parts
 from tui.session.bundle.subject import BundleSubject, DriveDocuments
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.event_notes import EventNotes

@@ -10,7 +10,7 @@ import pytest
 from tui.bus.fake import FakeLine
 from tui.bus.requests import WriteOne
 from tui.drive.profile import library
-from tui.screens.not_stopped import is_not_stopped
+from tui.screens.frame_source import is_not_stopped
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
 from tui.session.connect.identify import DriveIdentity

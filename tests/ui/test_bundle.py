@@ -16,10 +16,9 @@ from textual.widgets import Input
 from tests.bus.peer import PtyPeer, silent
 from tui.app import DrivePanelApp
 from tui.cli.shared.diagnosis_documents import drive_documents
-from tui.screens.bundle import NO_LINE_CHOSEN
+from tui.screens.bundle import CANCELLED, NO_LINE_CHOSEN, BundleScreen
+from tui.screens.choosing import Palette
 from tui.screens.dialogs.ask import Ask
-from tui.screens.dialogs.bundle import CANCELLED, BundleScreen
-from tui.screens.dialogs.palette import Palette
 from tui.session.bundle.archive import Bundle
 from tui.session.bundle.parts import PartProgress
 from tui.session.connect.open_line import open_line

@@ -22,7 +22,7 @@ from tests.sources import calls_of
 from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.bus.program import Program
-from tui.screens.command.options import OptionsScreen
+from tui.screens.command.command_keys import OptionsScreen
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask

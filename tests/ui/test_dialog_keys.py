@@ -23,26 +23,25 @@ from tui.bus.errors import LinkSyntaxError
 from tui.drive.profile import library
 from tui.drive.settings.edits import Edits
 from tui.screens.blocks.pick_parameter import PickParameter
-from tui.screens.command.options import OptionsScreen
+from tui.screens.bundle import BundleScreen
+from tui.screens.choosing import Palette
+from tui.screens.command.command_keys import OptionsScreen
 from tui.screens.command.teaching import PickWord, fault_of_look
 from tui.screens.connection.choices import fault_of_line
-from tui.screens.dialogs.ask import Ask
-from tui.screens.dialogs.bundle import BundleScreen
+from tui.screens.dialogs.ask import Ask, fault_of_new
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.dialogs.files import fault_of_new
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorStates
-from tui.screens.dialogs.palette import Palette
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import KeyQuestion, Question
-from tui.screens.dialogs.why import WhyScreen
 from tui.screens.frame import Framed
 from tui.screens.frames.choice import choice_of
 from tui.screens.keys.help import HelpScreen
 from tui.screens.monitor.screen import MonitorScreen, fault_of_rating
 from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
-from tui.screens.parameters.results import RestQuestion, Results
-from tui.screens.parameters.skipped import Skipped
+from tui.screens.parameters.set_keys import Skipped
+from tui.screens.parameters.write_keys import RestQuestion, Results
+from tui.screens.why import WhyScreen
 from tui.session.bundle.archive import Bundle
 from tui.session.bundle.parts import PartProgress
 from tui.session.connect.addresses import parse_addresses

@@ -90,7 +90,7 @@ def test_frames(
     snap_compare: Compare, page: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     keys, prepare = PAGES[page]
-    monkeypatch.setattr("tui.screens.frames.counter_keys.CounterKeys._begin_sum", lambda _: None)
+    monkeypatch.setattr("tui.screens.frames.screen.CounterKeys._begin_sum", lambda _: None)
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
     app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()

@@ -25,7 +25,7 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.keys.action import CONNECTION, LISTENING, OPENING, Action
 from tui.screens.keys.screens import EVERYWHERE, TABBED
 from tui.screens.keys.table import ACTIONS, elsewhere, key_meanings, keys_line
-from tui.screens.monitor.commands import order_keys
+from tui.screens.monitor.screen import order_keys
 from tui.screens.open_lines import LineOpening
 from tui.screens.parameters.screen import ParametersScreen
 from tui.widgets.palette import ATTENTION

@@ -10,7 +10,7 @@ from tui.drive.orders import MOVING_ORDERS
 from tui.drive.profile import library
 from tui.drive.profile.schema import Bit
 from tui.screens.command.control import Control, hindrance
-from tui.screens.monitor.notices import NOTICE_ROWS, line_figures, notice_lines
+from tui.screens.monitor.assembly import NOTICE_ROWS, line_figures, notice_lines
 from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
 from tui.screens.monitor.state import state_lines

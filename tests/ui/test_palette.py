@@ -9,11 +9,11 @@ from textual.widgets import OptionList
 
 from tests.sweeps import kept
 from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.choosing import Palette
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.dialogs.palette import Palette
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.finding import BY_NAME, NOT_FOUND, WAYS, find

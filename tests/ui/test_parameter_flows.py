@@ -17,8 +17,8 @@ from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
 from tui.screens.parameters.parameter_list import shows_steps
-from tui.screens.parameters.results import RestQuestion, Results
 from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.parameters.write_keys import RestQuestion, Results
 
 from . import fakes
 from .fakes import press

@@ -20,9 +20,9 @@ from tui.screens.keys.screens import EVERYWHERE
 from tui.screens.keys.table import keys_line, screen_actions
 from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
 from tui.screens.monitor.assembly import codes_beside, monitor_parts, watched_words
-from tui.screens.monitor.commands import order_keys
 from tui.screens.monitor.motor import motor_lines, other_values, value_cells
 from tui.screens.monitor.readouts import readout_lines
+from tui.screens.monitor.screen import order_keys
 from tui.screens.monitor.view import View, readout_parameter
 from tui.session.monitor.trend import TrendPoint
 from tui.session.shown import Quality

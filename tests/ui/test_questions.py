@@ -15,7 +15,7 @@ from textual.screen import ModalScreen
 from tests.sweeps import kept
 from tui.drive.profile import library
 from tui.screens.blocks.screen import BlocksScreen
-from tui.screens.command.options import OptionsScreen
+from tui.screens.command.command_keys import OptionsScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
@@ -24,8 +24,8 @@ from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import Question, void_questions
 from tui.screens.keys.help import HelpScreen
-from tui.screens.parameters.results import RestQuestion
 from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.parameters.write_keys import RestQuestion
 from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot
 from tui.widgets.motor_state_text import motor_state_text

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tui.screens.dialogs.ask import Ask
-from tui.screens.monitor.input_keys import NOT_SIMULATED
+from tui.screens.monitor.run_keys import NOT_SIMULATED
 from tui.widgets.plain import Plain
 
 from .test_command_flows import Bench, bench, output, writes

@@ -22,15 +22,15 @@ from tui.app import DrivePanelApp
 from tui.drive.settings.restore_plan import RestoreItem
 from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.choosing import Palette
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.dialogs.palette import Palette
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.edit_value import EditNumber
 from tui.screens.parameters.screen import ParametersScreen
-from tui.screens.parameters.skipped import Skipped
+from tui.screens.parameters.set_keys import Skipped
 from tui.terminal.lean import cells_of
 from tui.widgets.plain import entry
 

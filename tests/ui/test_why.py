@@ -14,8 +14,8 @@ from tests.bus.peer import PtyPeer, silent
 from tui.app import DrivePanelApp
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
-from tui.screens.dialogs.why import WhyScreen, reason_lines
 from tui.screens.keys.finding import find
+from tui.screens.why import WhyScreen, reason_lines
 from tui.session.connect.open_line import open_line
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
 from tui.session.diagnosis.evidence import DiagnosticEvidence

@@ -1,15 +1,123 @@
-"""Execution of an action that was chosen in the palette."""
+"""The palette: every action of the panel, found by its words, and carried out."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.widgets import OptionList
+
+from tui.screens.keys.finding import FoundAction, find
+from tui.widgets.drawing import cut
+from tui.widgets.fields import JOINS_KEY, FilterField
+from tui.widgets.palette import FAINT, KEY, PLAIN
+from tui.widgets.plain import Plain, entry
 
 from .base import PanelScreen
-from .dialogs.palette import Palette
+from .dialogs.question import Question, hint
 
 if TYPE_CHECKING:
     from .app_port import Panel
-    from .keys.finding import FoundAction
+
+NAME_WIDTH, PLACE_WIDTH, KEY_WIDTH = 48, 14, 5
+"""Columns; where an action can be done here, its name has those of the place too."""
+
+
+MORE = "Typing also searches the other screens."
+
+
+class Palette(Question[FoundAction | None]):
+    """Gives the chosen action back, or None.
+
+    Nothing is selected at first: only what begins with each word that was typed.
+    """
+
+    BINDINGS: ClassVar = [
+        Binding("up", "step(-1)", show=False, priority=True),
+        Binding("down", "step(1)", show=False, priority=True),
+    ]
+
+    def __init__(self, screen: str) -> None:
+        super().__init__()
+        self._of = screen
+        self._found: list[FoundAction] = []
+
+    def dialog(self) -> ComposeResult:
+        """A field, and what fits what is typed there."""
+        with Vertical(id="dialog"):
+            yield Plain("Find an action", id="question")
+            yield FilterField(
+                placeholder="Type a word, for example eeprom, ramp, frames", id="search"
+            )
+            yield OptionList(id="choices", compact=True)
+            yield Plain("", id="count")
+            yield Plain("", id="hint")
+
+    def on_mount(self) -> None:
+        """List the possible actions."""
+        self.query_one(OptionList).can_focus = False
+        self._list("")
+
+    def on_input_changed(self) -> None:
+        """Less, as more is typed."""
+        self._list(self.query_one(FilterField).words)
+
+    def _list(self, query: str) -> None:
+        self._found = find(query, self._of)
+        options = self.query_one(OptionList)
+        options.clear_options()
+        options.add_options([entry(self._line(found)) for found in self._found])
+        ready = bool(self._found) and self._found[0].ready
+        options.highlighted = 0 if ready else None
+        count = "No match. Delete some letters."
+        if self._found:
+            many = len(self._found)
+            count = f"{many} match" if many == 1 else f"{many} matches" if query else MORE
+        self.query_one("#count", Plain).update(count)
+        self._tell_keys()
+
+    def _line(self, found: FoundAction) -> Text:
+        text = Text(no_wrap=True)
+        if found.here:
+            text.append(cut(found.name, NAME_WIDTH + 1 + PLACE_WIDTH), PLAIN)
+        else:
+            text.append(f"{cut(found.name, NAME_WIDTH)} ", FAINT)
+            text.append(cut(found.screen.capitalize(), PLACE_WIDTH), FAINT)
+        text.append(f"{found.action.shown:>{KEY_WIDTH}} ", KEY)
+        return text
+
+    def action_step(self, step: int) -> None:
+        """Another one of the list; the first step chooses the first."""
+        options = self.query_one(OptionList)
+        if not options.option_count:
+            return
+        at = options.highlighted
+        at = 0 if at is None else at + step
+        options.highlighted = min(max(0, at), options.option_count - 1)
+        self._tell_keys()
+
+    def _tell_keys(self) -> None:
+        """Show the effect of Enter."""
+        at = self.query_one(OptionList).highlighted
+        keys = [("Up, Down", "choose")] if self._found else []
+        keys.append(JOINS_KEY)
+        if at is not None:
+            found = self._found[at]
+            keys.append(("Enter", "run" if found.here else f"go to {found.screen.capitalize()}"))
+        self.tell_keys(hint(*keys, ("Esc", "cancel")))
+
+    def on_input_submitted(self) -> None:
+        """Take the one that is marked; where none is, nothing is chosen."""
+        at = self.query_one(OptionList).highlighted
+        if at is not None:
+            self.answer(self._found[at])
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Take the one that was clicked."""
+        self.answer(self._found[event.option_index])
 
 
 def open_palette(app: Panel) -> None:

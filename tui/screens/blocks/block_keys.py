@@ -12,7 +12,7 @@ from tui.drive.errors import DriveError
 from tui.session.blocks.editor import BlockEditor
 
 from ..command.arming import ArmingKeys
-from ..dialogs.files import fault_of_new
+from ..dialogs.ask import fault_of_new
 
 
 class BlockKeys(ArmingKeys):

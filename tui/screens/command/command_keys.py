@@ -1,19 +1,90 @@
-"""Keys that command the drive on the Monitor screen."""
+"""Keys that command the drive on the Monitor screen, and its options."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from functools import partial
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
 from tui.drive.fault_reset import no_fault, reset_codes, reset_follows
 from tui.drive.orders import OrderRefused, chart_in_force
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.plain import Plain, entry
 
+from ..dialogs.question import KeyQuestion, hint
 from .control import Control, hindrance
 from .teaching import PickWord, TeachKeys, words_to_teach
+
+if TYPE_CHECKING:
+    from ..dialogs.now import MotorStates
+
+OPTION_HINT = hint(("Up, Down", "choose"), ("y", "write"), ("Esc or q", "cancel"))
+
+
+class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
+    """A list of every choice; gives the one under the cursor back for `y`, or None."""
+
+    BINDINGS: ClassVar = [Binding("y", "yes", show=False), Binding("o", "no", show=False)]
+
+    def __init__(
+        self,
+        options: Sequence[CommandOption],
+        raws: Mapping[str, int],
+        now: MotorStates | None = None,
+    ) -> None:
+        super().__init__(now)
+        self._choices = [
+            (option, choice.bits, option_line(option, choice.bits, choice.name, raws))
+            for option in options
+            for choice in option.choices
+        ]
+
+    def dialog(self) -> ComposeResult:
+        """The list and its keys."""
+        with Vertical(id="dialog"):
+            yield Plain("Command options", id="question")
+            yield from self.now_lines()
+            yield OptionList(
+                *(entry(line, id=str(at)) for at, (_, _, line) in enumerate(self._choices)),
+                id="choices",
+                compact=True,
+            )
+            yield Plain(OPTION_HINT, id="hint")
+
+    def on_option_list_option_selected(self) -> None:
+        """Enter writes nothing: say which key does."""
+        reported = Text("Press y or Esc.   ", ALARM)
+        self.tell_keys(reported.append_text(OPTION_HINT))
+
+    def action_yes(self) -> None:
+        """Give the choice back."""
+        at = self.query_one(OptionList).highlighted
+        if at is not None:
+            option, bits, _ = self._choices[at]
+            self.answer((option, bits))
+
+
+def option_line(option: CommandOption, bits: int, name: str, raws: Mapping[str, int]) -> Text:
+    """One choice, with a mark where the drive holds it now."""
+    raw = raws.get(option.parameter)
+    held = raw is not None and raw & option.mask == bits
+    text = Text(no_wrap=True)
+    text.append(" ● " if held else " · ", STRONG if held else FAINT)
+    text.append(f"{option.name:<18}", FAINT)
+    text.append(f"{name:<16}", STRONG if held else PLAIN)
+    text.append(f"{option.parameter}{'  stopped only' if option.stopped_only else ''}", FAINT)
+    return text
+
 
 SHOWN_DONE = 8.0
 SHOWN_REFUSED = 20.0
@@ -192,7 +263,6 @@ class OrderKeys(TeachKeys):
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""
-        from .options import OptionsScreen
 
         if not self._require_armed():
             return

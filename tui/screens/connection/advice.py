@@ -7,6 +7,8 @@ from typing import NamedTuple
 from rich.style import Style
 from rich.text import Text
 
+from tui.bus import errors as faults
+from tui.drive import errors as drive_faults
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN
 
@@ -46,3 +48,22 @@ def _part(text: str, width: int, most: int, style: Style) -> list[Text]:
     return [
         Text(f"  {part}", style) for part in wrapped(text, max(10, width - ADVICE_INDENT), most)
     ]
+
+
+HINTS: tuple[tuple[type[Exception], str], ...] = (
+    (faults.PortBusy, "Press Enter to try again."),
+    (faults.PortMissing, "Plug in the adapter and press Enter, or choose another line."),
+    (faults.PortRefused, "Ask for the right to use the port (group dialout), or choose another."),
+    (faults.LinkSyntaxError, "Press n to type the line again."),
+    (faults.NoAnswer, "Press N to diagnose, s to scan again."),
+    (faults.ChecksumFault, "Press N to diagnose, s to scan again."),
+    (faults.LineLost, "Check cable, gateway and network; press Enter to try again."),
+    (faults.LineError, "Press Enter to try again, or choose another line."),
+    (drive_faults.UnknownProfile, "Clear or correct the profile, then s."),
+    (drive_faults.ProfileError, "Fix the file. `drivepanel profiles --check` lists all errors."),
+)
+
+
+def hint_for(error: Exception) -> str:
+    """Return what to try next."""
+    return next((hint for kind, hint in HINTS if isinstance(error, kind)), "Try again.")

@@ -22,20 +22,41 @@ from tui.widgets.palette import PLAIN
 
 from ..base import PanelScreen
 from ..frame import SELDOM
-from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines
+from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines, hint_for
 from .drive_list import DriveList
 from .found import about_lines
-from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
 from .rows import rows_of
-from .search_view import far_text, left_text
 from .wall import WallRow, column_heads, columns_for, heading, in_order, wall_line
 
 if TYPE_CHECKING:
     from tui.session.connect.search import Search
     from tui.session.fleet import FoundDrive
     from tui.session.monitor.look import Look
+
+IN_MINUTES = 100
+"""Seconds from which on a time is given in minutes."""
+
+
+def left_text(search: Search | None, later: float) -> str:
+    """Return the remaining time of a search, with `later` seconds of those that follow; empty if
+    unknown."""
+    if search is None or search.ended or not search.cost:
+        return ""
+    seconds = search.left + later
+    return f"{seconds / 60:.0f} min" if seconds >= IN_MINUTES else f"{max(1, round(seconds))} s"
+
+
+def far_text(search: Search, later: float, room: int) -> str:
+    """Return the progress of a search in `room` cells, with the remaining time if it is known."""
+    left = left_text(search, later)
+    if not left:
+        return search.text
+    requested = search.text.partition(",")[0]
+    forms = (f"{search.text}, {left} left", f"{requested}, {left} left", f"{requested}, {left}")
+    return next((form for form in forms if len(form) <= room), forms[-1])
+
 
 log = logging.getLogger(__name__)
 

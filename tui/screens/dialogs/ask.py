@@ -1,8 +1,9 @@
-"""A dialog that asks for one text, and does not let go of a wrong one."""
+"""A dialog that asks for one text, such as a file name, and does not accept a wrong one."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from textual.app import ComposeResult
@@ -16,6 +17,21 @@ from .question import Question, hint
 
 if TYPE_CHECKING:
     from .now import MotorStates
+
+
+def fault_of_new(name: str) -> str:
+    """Return the error in a name for a new file, or nothing."""
+    if not name.strip():
+        return "A name is needed."
+    if not name.isprintable():
+        return "A name has no control characters."
+    try:
+        return f"{name} already exists." if Path(name).expanduser().exists() else ""
+    except OSError as error:  # too long, or below a folder that may not be looked into
+        return f"No file can be made there: {error.strerror or error}."
+    except RuntimeError:
+        return f"There is no home folder of {name.partition('/')[0]}."
+
 
 TextCheck = Callable[[str], str]
 """Check of a text: its error, or nothing."""

@@ -20,7 +20,7 @@ from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 
 from ..command.command_keys import OrderKeys
-from ..dialogs.files import fault_of_new
+from ..dialogs.ask import fault_of_new
 from ..keys.action import FAULTS
 from ..keys.table import bindings
 from .doctor import doctor_lines

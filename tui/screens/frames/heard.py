@@ -1,4 +1,4 @@
-"""Listening: what others say on a line on which nothing is sent, as frames and summed up."""
+"""Listening: traffic of a line on which nothing is sent, as frames and summed up."""
 
 from __future__ import annotations
 
@@ -8,11 +8,54 @@ from typing import ClassVar
 from rich.text import Text
 
 from tui.session.listening.background import HeardLine
+from tui.session.listening.summary import ListeningSummary, summary_lines
+from tui.widgets.drawing import rule, wrapped
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 
 from ..keys.action import LISTENING
 from ..keys.table import bindings
 from .frame_list import FrameListScreen
-from .heard_view import heard_lines
+
+MOST_ROWS = 6
+"""Rows of one sentence at most."""
+OF_A_DRIVE, HANGING = 3, 5
+"""Columns before a sentence about a drive, and before the rest of it."""
+WARNINGS = ("NOT POLLED", "TWO ANSWERS", "A SECOND MASTER", "no answer", "damaged", "Broken")
+"""Words of a sentence to be emphasized."""
+
+
+def heard_lines(
+    summary: ListeningSummary, width: int, height: int, top: int
+) -> tuple[list[Text], int]:
+    """A heading and as many lines as there is room for, from `top` on; and the `top` that fits."""
+    lines = [line for text in summary_lines(summary) for line in _sentence(_here(text), width)]
+    room = max(1, height - 1)
+    top = max(0, min(top, len(lines) - room))
+    shown = lines[top : top + room]
+    drives = sum(bool(drive.tally.device) for drive in summary.drives)
+    more = "" if len(lines) <= room else f"{top + 1} to {top + len(shown)} of {len(lines)}"
+    heading = f"Traffic of {drives} drive{'' if drives == 1 else 's'}"
+    return [rule(heading, width, more), *shown], top
+
+
+def _here(text: str) -> str:
+    """In the words of the panel, which has a field instead of an option."""
+    text = text.replace("name it with -p", "enter it as Profile on Line")
+    return text.replace("set by -p", "entered on Line")
+
+
+def _sentence(text: str, width: int) -> list[Text]:
+    """A sentence on as many rows as it takes; those about a drive follow its name."""
+    about_drive = text.startswith(" ")
+    first = OF_A_DRIVE if about_drive else 1
+    name = not about_drive and text.startswith(("Device", "Broadcast"))
+    style = STRONG if name else FAINT if about_drive else PLAIN
+    if any(warning in text for warning in WARNINGS):
+        style = ALARM
+    rows = wrapped(text.strip(), max(10, width - HANGING), MOST_ROWS)
+    return [
+        Text(" " * (HANGING if number else first) + row, style) for number, row in enumerate(rows)
+    ]
 
 
 class HeardScreen(FrameListScreen):

@@ -36,8 +36,7 @@ class KeptFrames(NamedTuple):
 
 def ask_where(app: Panel, kept: KeptFrames) -> None:
     """Ask for the file, and save the frames in the form that its name asks for."""
-    from ..dialogs.ask import Ask
-    from ..dialogs.files import fault_of_new
+    from ..dialogs.ask import Ask, fault_of_new
 
     if not kept.frames:
         app.tell("Nothing to save: no frame is shown.")

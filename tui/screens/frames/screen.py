@@ -5,16 +5,125 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import ClassVar
 
+from rich.text import Text
+
 from tui.bus.api import Frame, ModbusLine
+from tui.bus.errors import LineError
 from tui.bus.link import Link
+from tui.drive.orders import OrderRefused
+from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
+from tui.session.work import Permit, Task
 
 from ..app_port import Panel
+from ..base import PanelScreen
 from ..keys.action import FRAMES
 from ..keys.table import bindings
-from .counter_keys import CounterKeys
 from .frame_list import FrameListScreen
+
+COUNTERS_EVERY, COUNTERS_SELDOM = 3.0, 10.0
+"""Seconds between two looks at the drive's own counters, and on a slow link."""
+RESETS_NOTHING_ELSE = (
+    "Function 8, sub-function 0A: by the manual it sets the counters of the drive's exchanges to 0"
+    " and nothing else. The motor continues unchanged. Other programs that compare them restart."
+)
+
+
+class CounterKeys(PanelScreen):
+    """Keys of the page of counters."""
+
+    def __init__(self, console: DriveConsole) -> None:
+        super().__init__()
+        self.console = console
+        self.session = console.session
+        self._looking = False
+
+    def on_mount(self) -> None:
+        """Look at the drive's own now and then, while they are shown."""
+        every = COUNTERS_SELDOM if self.app.low_bandwidth else COUNTERS_EVERY
+        self.set_interval(every, self._begin_sum)
+
+    @property
+    def shows_counters(self) -> bool:
+        """True if the counters are shown now."""
+        raise NotImplementedError
+
+    def sum_lines(self, width: int, height: int) -> list[Text]:
+        """The page as it is now."""
+        from .counters_view import counters_lines
+
+        session = self.session
+        who = plain(f"drive {session.device}, {session.profile.name}")
+        return counters_lines(self.console.counters.now(), who, width, height)
+
+    def _begin_sum(self) -> None:
+        # one after the other: with a silent drive a look takes longer than the time between two
+        if self.shows_counters and self.is_current and not self._looking:
+            self._looking = True
+            self.run_worker(self._read_counters(), group="counters")
+
+    async def _read_counters(self) -> None:
+        try:
+            await self.console.counters.look()
+        finally:
+            self._looking = False
+        self.look()
+
+    def action_reset_counters(self) -> None:
+        """Count from now on; only what this panel shows."""
+        if self._require_shown():
+            self.console.counters.reset_ours()
+            self.app.tell("Counted from now on. What was counted since the line was opened stays.")
+            self.look()
+
+    def action_reset_drive_counters(self) -> None:
+        """Armed, ask; then set the drive's own counters to 0."""
+        watch, device = self.console.counters, self.session.device
+        if not self._require_shown():
+            return
+        if not watch.can_reset_drive:
+            read_only = self.session.line.read_only
+            why = "the line is read-only" if read_only else "the drive has no such command"
+            self.app.tell(f"The drive's own counters cannot be reset: {why}.")
+            return
+        if not self.session.arming.armed:
+            self.app.tell("Not armed. Press a on Monitor to arm this drive.")
+            return
+        from ..dialogs.confirm import Confirm
+        from ..dialogs.now import MotorStates
+
+        stamp = self.session.work.stops
+
+        def reported(sure: bool | None) -> None:
+            if not sure:
+                return
+            try:
+                self.session.work.put(Task(self._reset_drive, owner=self.console), stamp)
+            except OrderRefused as refused:  # it is not armed any more, or was stopped since
+                self.app.events.add("refused", f"Counters not reset: {refused}", device)
+
+        requested = Confirm(
+            f"Reset the counters of drive {device}?",
+            RESETS_NOTHING_ELSE,
+            yes="Reset",
+            no="Cancel",
+            loses=True,
+            now=MotorStates(self.app, [self.session]),
+        )
+        self.app.push_screen(requested, reported)
+
+    async def _reset_drive(self, _: Permit) -> str:
+        try:
+            await self.console.counters.reset_drive(self.console.journal)
+        except LineError as error:
+            raise OrderRefused(f"Counters not reset: {error}") from error
+        return "The drive's counters are reset."
+
+    def _require_shown(self) -> bool:
+        if not self.shows_counters:
+            self.app.tell("Tab shows the counters first.")
+        return self.shows_counters
 
 
 class OwnFrames:

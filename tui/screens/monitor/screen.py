@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 from typing import TYPE_CHECKING, ClassVar
 
+from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
@@ -15,8 +17,9 @@ from textual.timer import Timer
 from tui.session.command.stop_report import Phase, StopReport
 from tui.session.console import DriveConsole
 from tui.session.shown import Rating
+from tui.widgets.drawing import KeyLabel, key_line, key_styles
 from tui.widgets.lines import Lines
-from tui.widgets.palette import STALE
+from tui.widgets.palette import ATTENTION, FAINT, STALE, STRONG
 from tui.widgets.strip import FrameView
 
 from ..command.control import Control
@@ -26,13 +29,34 @@ from ..keys.action import MONITOR
 from ..keys.table import bindings, keys_line
 from .arrange import Arrangement, arrange
 from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words, word_parts
-from .commands import order_keys
-from .input_keys import InputKeys
 from .motor import other_values
+from .run_keys import InputKeys
 from .view import SPANS, USUAL_SPAN, View
 
 if TYPE_CHECKING:
     from ..app_port import Panel
+
+
+def order_keys(view: View, keys: Sequence[KeyLabel]) -> Text:
+    """The line of keys: stop first; orders that cannot work now are dim."""
+
+    def styles(action: str) -> tuple[Style, Style]:
+        if not action.startswith(("reset", "run_line")):
+            return key_styles(action)
+        return (ATTENTION, STRONG) if works_now(view, action) else (FAINT, FAINT)
+
+    return key_line(keys, styles)
+
+
+def works_now(view: View, action: str) -> bool:
+    """Return True if an order can work now, as far as is known without asking the drive."""
+    if view.control.armed_for is None or view.lost or view.snapshot is None:
+        return False
+    in_fault = view.snapshot.state.kind == "fault"
+    if action == "reset" or in_fault:
+        return in_fault and action in ("reset", "run_line('reference')")
+    return view.control.hindrance is None or action == "run_line('reference')"
+
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""

@@ -4,21 +4,84 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.table import Table
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical, VerticalScroll
 
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
+from tui.drive.plain import plain
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.restore_plan import RestoreItem
 from tui.drive.settings.selection import Choice
+from tui.drive.settings.set_file import read_set
+from tui.drive.settings.writable import is_setting
+from tui.widgets.palette import PLAIN, STRONG
+from tui.widgets.plain import Plain
 
-from ..dialogs.files import fault_of_new
+from ..dialogs.ask import fault_of_new
+from ..dialogs.pick_file import FileAbout
+from ..dialogs.question import KeyQuestion, hint
 from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
 
-    from ..dialogs.pick_file import FileAbout
+SKIPPED_KEYS = hint(("Enter or Esc", "close"), ("Up, Down", "scroll"))
+
+
+class Skipped(KeyQuestion[None]):
+    """A list to read through; scrolls."""
+
+    BINDINGS: ClassVar = [Binding("enter", "no", show=False)]
+
+    def __init__(self, staged: int, label: str, left: Sequence[RestoreItem]) -> None:
+        super().__init__()
+        self._head = f"{staged} staged from {label}; {len(left)} left out"
+        self._left = left
+
+    def dialog(self) -> ComposeResult:
+        """Each with its reason."""
+        table = Table.grid(padding=(0, 2, 0, 0))
+        for item in self._left:
+            table.add_row(
+                Text(plain(item.code), STRONG, no_wrap=True), Text(plain(item.text), PLAIN)
+            )
+        with Vertical(id="dialog"):
+            yield Plain(self._head, id="question")
+            with VerticalScroll(id="says"):
+                yield Plain(table)
+            yield Plain(SKIPPED_KEYS, id="hint")
+
+
+def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbout:
+    """Of which drive it is, and how many settings it has otherwise than the drive holds.
+
+    `raws` is what is known of the drive by now: what was not read yet differs from nothing.
+    """
+    try:
+        values = read_set(path, path.name)
+    except DriveError:
+        return FileAbout(reported="invalid file", alarm=True)
+    head = values.head
+    named = head.identity.get("name") or head.family or head.profile
+    drive = f"{head.device:>2} {named}" if head.device else named
+    if head.profile != profile.id:
+        return FileAbout(drive, "other family", alarm=True)
+    known = [code for code in values.raws if code in raws and profile.get(code)]
+    different = [code for code in known if raws[code] != values.raws[code]]
+    count = sum(is_setting(profile, profile[code]) for code in different)
+    if not known:
+        return FileAbout(drive, "not compared")
+    return FileAbout(
+        drive, f"{count} {'differs' if count == 1 else 'differ'}" if count else "equal"
+    )
 
 
 class SetKeys(ParameterKeys):
@@ -131,7 +194,6 @@ class SetKeys(ParameterKeys):
         profile, raws = self.session.profile, dict(self.editor.values.raws)
 
         def about(path: Path) -> FileAbout:
-            from .set_about import about_set
 
             return about_set(path, profile, raws)
 
@@ -209,7 +271,6 @@ class SetKeys(ParameterKeys):
         self.run_worker(self._stage_set(), exclusive=True, group="sets")
 
     async def _stage_set(self) -> None:
-        from .skipped import Skipped
 
         editor = self.editor
         try:

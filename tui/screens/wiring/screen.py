@@ -2,24 +2,64 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, ClassVar
 
+from rich.text import Text
 from textual.app import ComposeResult
 from textual.events import ScreenResume
 
 from tui.bus.errors import LineError
-from tui.drive.family_page import PageLine, family_page, page_lines
+from tui.drive.family_page import PageLine, PageRow, PageSection, family_page, page_lines
 from tui.drive.model import model_codes, model_read
 from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
 from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 
 from ..base import PanelScreen
 from ..keys.action import WIRING
 from ..keys.table import bindings
-from .view import section_tops, trouble_sections, wiring_lines
+
+if TYPE_CHECKING:
+    from tui.session.diagnosis.diagnosis import Diagnosis
+
+
+def trouble_sections(found: Diagnosis | None, wall: float) -> list[PageSection]:
+    """The verdict of N with its steps, measured at this time; none if the drive answers well."""
+    if found is None or found.well:
+        return []
+    rows = [PageRow("!", found.text, warns=True)]
+    if found.others:
+        rows.append(PageRow("Certainty", f"{found.certainty}. It could also be:"))
+        rows += [PageRow("", other) for other in found.others]
+    heads = ["Next steps", *("" for _ in found.steps)]
+    rows += [PageRow(head, step) for head, step in zip(heads, found.steps, strict=False)]
+    at = time.strftime("%H:%M:%S", time.localtime(wall))
+    return [PageSection(f"Trouble, measured at {at}", tuple(rows))]
+
+
+def wiring_lines(page: Sequence[PageLine]) -> list[Text]:
+    """The lines of a page with their colors: amber where it warns, else grey."""
+    return [_line(line) for line in page]
+
+
+def _line(line: PageLine) -> Text:
+    if line.kind == "title":
+        return Text(f" {line.head}", STRONG, no_wrap=True)
+    text = Text(line.head, FAINT, no_wrap=True)
+    if line.kind == "warning":
+        text.stylize(ALARM)
+    text.append(line.text, PLAIN)
+    return text
+
+
+def section_tops(page: Sequence[PageLine]) -> list[int]:
+    """Return the first line of each section."""
+    return [number for number, line in enumerate(page) if line.kind == "title"]
 
 
 class WiringScreen(PanelScreen):

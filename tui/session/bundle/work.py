@@ -5,10 +5,9 @@ from __future__ import annotations
 from tui.bus.program import Program
 
 from .archive import Bundle, archive
-from .drive_parts import drive_parts
+from .drive_parts import drive_parts, past_parts
 from .line_parts import line_parts, record_parts
 from .parts import PartProgress, collect_parts, in_own_thread
-from .past_parts import past_parts
 from .redaction import Redaction, local_names
 from .subject import BundleSubject
 

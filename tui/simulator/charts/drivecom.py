@@ -28,8 +28,7 @@ from .drivecom_states import DrivecomCommand, DrivecomState, command_of
 from .drivecom_status import Appearance, show_drivecom
 from .drivecom_stops import commanded_stop, extended_command, external_fault, locked, stop_type
 from .io_profile import io_status
-from .line_command import LineCommand
-from .wiring import TerminalWiring
+from .wiring import LineCommand, TerminalWiring
 
 COMMISSIONED = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND}
 """Channels of a drive whose profile has no words that select them."""
