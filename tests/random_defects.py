@@ -15,6 +15,7 @@ import time
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from fnmatch import fnmatch
 from functools import cache, cached_property
 from itertools import islice, zip_longest
 from pathlib import Path
@@ -39,8 +40,17 @@ MOST_SECONDS = 100.0, 200.0
 FOLDERS = {"screens": "ui", "keeper": "session"}
 """By package: the folder of its tests, if it has another name."""
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-random-defects.json"
-IN_PROCESSES = {"tui/keeper/": ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py")}
-"""By the beginning of a path: tests of code that runs in processes that are not recorded."""
+NOT_RECORDED = {
+    "tui/keeper/*": ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py"),
+    "tui/screens/*/registration.py": ("tests/ui/test_key_pages.py", "tests/ui/test_palette.py"),
+    "tui/screens/blocks/registration.py": ("tests/ui/test_block_pictures.py",),
+    "tui/screens/connection/registration.py": ("tests/ui/test_line_pictures.py",),
+    "tui/screens/frames/registration.py": ("tests/ui/test_frame_pictures.py",),
+    "tui/screens/monitor/registration.py": ("tests/ui/test_monitor_pictures.py",),
+    "tui/screens/parameters/registration.py": ("tests/ui/test_parameter_pictures.py",),
+    "tui/screens/keys/*": ("tests/ui/test_key_pages.py",),
+}
+"""By the pattern of a path: tests of code that runs in processes of its own, or at import only."""
 BY_SOURCE = re.compile(r"\bwith self\._|Thread\(|\.spawn\(")
 """Lines on locks, threads and workers, which tests check in the source."""
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/.*)$", re.MULTILINE)
@@ -173,8 +183,8 @@ class Chooser:
     def tests(self, mutant: Mutant) -> list[list[str]]:
         """The tests to run, those most about the changed line first, and those to run then."""
         first, then = self._best(self._reaching(mutant) & self._usable, mutant.path)
-        for beginning, others in IN_PROCESSES.items():
-            if mutant.path.startswith(beginning):
+        for pattern, others in NOT_RECORDED.items():
+            if fnmatch(mutant.path, pattern):
                 first += others
         if BY_SOURCE.search(_text(mutant.path).splitlines()[mutant.line - 1]):
             first.append("tests/test_locks.py")

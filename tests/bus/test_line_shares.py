@@ -10,7 +10,7 @@ from collections.abc import Callable
 import pytest
 
 from tui.bus.api import Priority, Reply
-from tui.bus.errors import LineLost, RequestRefused
+from tui.bus.errors import LineClosed, LineLost, RequestRefused
 from tui.bus.line import Timing
 from tui.bus.master import ExchangeResult, ResultKind, Sending
 from tui.bus.requests import Read, WriteOne
@@ -302,3 +302,34 @@ async def test_command_that_is_held_back_at_the_last_moment_is_sent_later() -> N
     await outcome(line, command)
     assert line.sent == [command]
     assert line.now >= until
+
+
+async def test_reply_is_due_from_the_request_to_the_end_of_its_exchange() -> None:
+    """The next program on the line waits for a reply that is due when this one leaves."""
+    line, due = TimedLine(), []
+    line.last_moment = lambda: due.append(line.dispatcher.in_flight)
+    await outcome(line, line.ask(Priority.POLL))
+    assert (due, line.dispatcher.in_flight) == ([True], False)
+    line.last_moment = lambda: line.dispatcher.facts.give_stop([1], "the stop key")
+    with pytest.raises(RequestRefused):
+        await outcome(line, line.ask(Priority.OPERATOR_WRITE, word=7))
+    assert not line.dispatcher.in_flight
+
+
+async def test_reply_is_due_after_its_exchange_was_cut_short() -> None:
+    line = TimedLine()
+    begun = asyncio.Event()
+
+    async def hangs(sending: Sending) -> ExchangeResult:
+        begun.set()
+        return await asyncio.Future()
+
+    line.exchange = hangs  # type: ignore[method-assign]
+    line.end = math.inf
+    job = line.ask(Priority.POLL)
+    serving = asyncio.ensure_future(line.dispatcher.serve(line))  # type: ignore[arg-type]
+    await asyncio.wait_for(begun.wait(), 20.0)
+    serving.cancel()
+    await asyncio.wait([serving])
+    assert line.dispatcher.in_flight
+    assert isinstance(job.answer.exception(0), LineClosed)

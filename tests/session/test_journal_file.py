@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import stat
 import subprocess
 import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from threading import Timer
 
 import pytest
 
@@ -166,6 +169,48 @@ def test_files_are_rotated_by_one_program_at_a_time(
     file.append('{"three": 3}')
     assert file.path.read_text() == '{"three": 3}\n'
     assert file.all[-2].read_text() == '{"one": 1}\n{"two": 2}\n'
+
+
+@posix
+@pytest.mark.parametrize("kept_for", [0.0, 0.2, None])
+def test_turn_of_another_program_is_awaited_for_half_a_second(
+    tmp_path: Path, kept_for: float | None
+) -> None:
+    import fcntl
+
+    other, own = (os.open(tmp_path, os.O_RDONLY) for _ in range(2))
+    released: Timer | None = None
+    try:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        if kept_for is not None:
+            released = Timer(kept_for, fcntl.flock, (other, fcntl.LOCK_UN))
+            released.start()
+        begun = time.monotonic()
+        assert journal_file._locked(own) is (kept_for is not None)
+        assert kept_for is not None or time.monotonic() - begun > 0.4
+        if released is not None:
+            with pytest.raises(BlockingIOError):
+                fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    finally:
+        if released is not None:
+            released.join()
+        os.close(other)
+        os.close(own)
+
+
+@posix
+def test_file_system_without_locks_keeps_nobody_waiting(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refuse(*_: object) -> None:
+        raise OSError(errno.ENOLCK, "No locks available")
+
+    monkeypatch.setattr("fcntl.flock", refuse)
+    monkeypatch.setattr(journal_file, "LARGEST_FILE", 10)
+    file = JournalFile(tmp_path)
+    for number in (1, 2):
+        file.append(f'{{"number": {number}}}')
+    assert file.path.read_text() == '{"number": 2}\n', "it is rotated"
 
 
 @posix

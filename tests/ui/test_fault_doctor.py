@@ -9,7 +9,7 @@ import pytest
 from tests.ui.fakes import NOW, readings_of
 from tui.drive.hints import codes_to_read, reset_text
 from tui.drive.profile import library
-from tui.screens.faults.doctor import doctor_lines
+from tui.screens.faults.doctor import LABEL, _history, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
 
 from .test_frame import panel
@@ -199,3 +199,24 @@ def test_promoted_cause_is_not_shown_as_certain() -> None:
 def test_values_that_exclude_advice_are_read_with_the_fault() -> None:
     help_ = ATV71.guide.fault(18)
     assert {"BRA", "ULP0", "VCAL"} <= set(codes_to_read(ATV71, help_))
+
+
+@pytest.mark.parametrize("height", range(1, 12))
+@pytest.mark.parametrize("cursor", range(-1, 8))
+def test_history_shows_as_many_faults_as_fit_and_the_one_under_the_cursor(
+    cursor: int, height: int
+) -> None:
+    profile = library.load("atv71")
+    raws = {code: 3 + number for number, code in enumerate(profile.data.faults.history)}
+    shown = view(None, profile=profile, present=False, readings=readings_of(profile, raws, NOW))
+    shown = replace(shown, at=len(shown.look_at) + cursor)
+    count = len(shown.history)
+    lines = [line.plain for line in _history(shown, 80, height)]
+    numbers = [line[LABEL:].split()[0].replace("last", "1") for line in lines]
+    first = int(numbers[0])
+    assert list(map(int, numbers)) == list(range(first, first + min(height, count)))
+    if cursor < count:
+        assert cursor < 0 or str(cursor + 1) in numbers
+        assert first == max(1, cursor + 2 - height), "no further than the cursor needs"
+    assert lines[0].split()[0] == "History"
+    assert all(not line[:LABEL].strip() for line in lines[1:])

@@ -3,16 +3,22 @@
 from __future__ import annotations
 
 import re
+from importlib import import_module
+from inspect import signature
 from pathlib import Path
 
 import pytest
+from textual.actions import parse
+from textual.screen import Screen
 
+from tui.app import DrivePanelApp
 from tui.screens.keys.action import KEY_NAMES
 from tui.screens.keys.pages import EVERY_SCREEN, TABLE, key_table, with_tables, write_pages
 from tui.screens.keys.screens import EVERYWHERE, SCREENS
-from tui.screens.keys.table import ACTIONS
+from tui.screens.keys.table import ACTIONS, bindings
 
-PAGES = sorted((Path(__file__).resolve().parents[2] / "docs" / "screens").glob("*.md"))
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = sorted((ROOT / "docs" / "screens").glob("*.md"))
 MAKE = "python -m tui.screens.keys.pages docs/screens"
 ROW = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 
@@ -91,3 +97,43 @@ def test_actions_without_a_key_follow_the_table() -> None:
     table = key_table("line")
     assert "- Close the line. Asks first if a drive reacts to that." in table
     assert "|  |" not in table
+
+
+def screen_classes() -> dict[str, type[Screen[None]]]:
+    """The class of each registered screen, by its name in the code."""
+    modules = [
+        ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        for path in (ROOT / "tui" / "screens").rglob("*.py")
+        if "BINDINGS: ClassVar = bindings(" in path.read_text("utf-8")
+    ]
+    found = {}
+    for screen in EVERYWHERE:
+        for module in map(import_module, modules):
+            for made in vars(module).values():
+                if isinstance(made, type) and vars(made).get("BINDINGS") == bindings(screen):
+                    found[screen] = made
+    return found
+
+
+def test_each_action_calls_a_method_of_its_screens_with_arguments_that_it_takes() -> None:
+    classes = screen_classes()
+    assert set(classes) == set(EVERYWHERE)
+    for action in ACTIONS:
+        _, name, arguments = parse(action.id)
+        for owner in [DrivePanelApp] if action.app else [classes[of] for of in action.screens]:
+            method = getattr(owner, f"action_{name}", None)
+            assert method is not None, (owner, action.id)
+            signature(method).bind(owner, *arguments)  # raises TypeError
+
+
+def test_keys_that_are_opposites_move_by_the_same_steps() -> None:
+    """Up and down, next and previous: one action, with arguments of both signs."""
+    by_screen: dict[tuple[str, str], set[tuple[object, ...]]] = {}
+    for action in ACTIONS:
+        _, name, arguments = parse(action.id)
+        if arguments and not isinstance(arguments[0], str):
+            for screen in action.screens:
+                by_screen.setdefault((screen, name), set()).add(arguments)
+    for steps in by_screen.values():
+        numbers = {int(str(step)) for (step,) in steps}
+        assert numbers == {-number for number in numbers}

@@ -1,0 +1,106 @@
+"""Longer reads by which a drive proves its step: those that it takes, and those given up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tui.bus.master import ExchangeResult, ResultKind
+from tui.bus.requests import Read
+from tui.bus.schedule.probes import Forms
+
+from .conftest import WIDE
+
+OWN = Read(1, 100, 2)
+MINUTE = 60.0
+
+
+class Timed(Forms):
+    """Forms by a clock of the test's own."""
+
+    def __init__(self) -> None:
+        self.now = 1000.0
+        super().__init__(lambda: self.now)
+
+    def ends(self, count: int, *kinds: ResultKind) -> None:
+        for kind in kinds:
+            self.note(replace(OWN, count=count), ExchangeResult(kind))
+
+    def counts(self, read: Read = OWN) -> list[int]:
+        return [form.count for form in self.longer(read, WIDE)]
+
+
+@pytest.fixture
+def forms() -> Timed:
+    return Timed()
+
+
+def test_up_to_eight_registers_more_are_read(forms: Timed) -> None:
+    assert forms.counts() == list(range(3, 11))
+    assert [form.address for form in forms.longer(OWN, WIDE)] == [100] * 8
+
+
+def test_no_longer_read_than_the_device_takes(forms: Timed) -> None:
+    found = [form.count for form in forms.longer(OWN, replace(WIDE, max_read=4))]
+    assert found == [3, 4]
+
+
+def test_read_that_was_refused_is_not_sent_again_nor_a_longer_one(forms: Timed) -> None:
+    forms.ends(5, ResultKind.EXCEPTION)
+    forms.now += 100 * MINUTE
+    assert forms.counts() == [3, 4]
+
+
+@pytest.mark.parametrize("kind", [ResultKind.NOTHING, ResultKind.DAMAGED, ResultKind.WRONG])
+def test_second_read_in_a_row_without_a_reply_is_given_up_for_a_minute(
+    forms: Timed, kind: ResultKind
+) -> None:
+    forms.ends(5, kind)
+    assert 5 in forms.counts()
+    forms.ends(5, kind)
+    forms.now += MINUTE - 1
+    assert forms.counts() == [3, 4]
+    forms.now += 2
+    assert forms.counts() == list(range(3, 11))
+    forms.ends(5, kind)
+    assert 5 in forms.counts(), "it counts from the start again"
+
+
+def test_reply_between_two_silences_ends_the_count(forms: Timed) -> None:
+    forms.ends(5, ResultKind.NOTHING, ResultKind.REPLY, ResultKind.NOTHING)
+    assert forms.counts() == list(range(3, 11))
+
+
+def test_silence_is_that_of_the_registers_alone(forms: Timed) -> None:
+    forms.ends(5, ResultKind.NOTHING, ResultKind.NOTHING)
+    assert forms.counts(replace(OWN, address=101)) == list(range(3, 11))
+    assert forms.counts(replace(OWN, device=2)) == list(range(3, 11))
+    assert forms.may_be_longer(1)
+
+
+def test_drive_that_is_silent_to_longer_reads_gets_none_for_five_minutes(forms: Timed) -> None:
+    forms.note_silence(1)
+    assert forms.may_be_longer(1)
+    forms.note_silence(1)
+    forms.now += 5 * MINUTE - 1
+    assert (forms.may_be_longer(1), forms.may_be_longer(2)) == (False, True)
+    forms.now += 2
+    assert forms.may_be_longer(1)
+
+
+def test_reply_to_a_longer_read_ends_the_silence_of_a_drive(forms: Timed) -> None:
+    forms.note_silence(1)
+    forms.note_silence(1)
+    forms.ends(3, ResultKind.REPLY)
+    assert forms.may_be_longer(1)
+
+
+def test_failures_of_4096_reads_are_remembered_at_most(forms: Timed) -> None:
+    forms.ends(5, ResultKind.EXCEPTION)
+    for address in range(4095):
+        assert forms.counts() == [3, 4]
+        forms.note(Read(2, address, 3), ExchangeResult(ResultKind.EXCEPTION))
+    forms.note(Read(3, 1, 3), ExchangeResult(ResultKind.EXCEPTION))
+    assert forms.counts() == list(range(3, 11))
+    assert 3 not in forms.counts(Read(3, 1, 2))
