@@ -129,7 +129,7 @@ def test_import_circle_is_found(source: str) -> None:
     assert circle(trees, frozenset({"p"})) == []
 
 
-def test_every_contract_of_the_design_is_in_the_configuration() -> None:
+def test_every_import_contract_of_the_design_is_configured() -> None:
     import tomli
 
     linter = tomli.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
@@ -140,7 +140,7 @@ def test_every_contract_of_the_design_is_in_the_configuration() -> None:
     assert present <= named
 
 
-def test_registered_screens_do_not_know_each_other() -> None:
+def test_registered_screens_do_not_import_each_other() -> None:
     """A screen that the contract does not name is in the same layer as those that it names."""
     import grimp
     import tomli
@@ -170,9 +170,7 @@ def test_registered_screens_do_not_know_each_other() -> None:
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
-def test_a_command_imports_what_it_needs_and_no_more(
-    arguments: list[str], unwanted: set[str]
-) -> None:
+def test_command_imports_only_what_it_needs(arguments: list[str], unwanted: set[str]) -> None:
     done = run(sys.executable, "-c", LOADED, *arguments)
     assert done.returncode == 0, done.stderr
     loaded = set(done.stderr.split())
@@ -180,7 +178,7 @@ def test_a_command_imports_what_it_needs_and_no_more(
     assert not loaded & unwanted
 
 
-def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> None:
+def test_panel_is_shown_before_line_modules_are_imported() -> None:
     start = (
         "import asyncio, gc, sys\n"
         "from tui.cli import opening\n"
@@ -220,7 +218,7 @@ def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> No
     assert "tui.drive.profile.profile" not in loaded
 
 
-def test_the_wheel_holds_tui_alone_and_all_profiles(tmp_path: Path) -> None:
+def test_wheel_contains_tui_and_all_profiles_only(tmp_path: Path) -> None:
     build = "import sys; from hatchling.build import build_wheel; build_wheel(sys.argv[1])"
     done = run(sys.executable, "-c", build, str(tmp_path))
     assert done.returncode == 0, done.stderr
@@ -238,7 +236,7 @@ def test_the_wheel_holds_tui_alone_and_all_profiles(tmp_path: Path) -> None:
     assert styles <= set(names)
 
 
-def test_the_installed_wheel_works_in_another_folder(tmp_path: Path) -> None:
+def test_installed_wheel_works_in_another_folder(tmp_path: Path) -> None:
     build = "import sys; from hatchling.build import build_wheel; build_wheel(sys.argv[1])"
     assert run(sys.executable, "-c", build, str(tmp_path)).returncode == 0
     (wheel,) = tmp_path.glob("*.whl")
@@ -272,7 +270,7 @@ def test_readme_gives_one_command_to_start_and_one_to_test() -> None:
         assert "-c constraints.txt" in command
 
 
-def test_the_gate_runs_the_test_command_of_readme() -> None:
+def test_gate_runs_the_test_command_of_readme() -> None:
     script = CI.read_text(encoding="utf-8")
     assert CI.stat().st_mode & stat.S_IXUSR
     assert "set -euo pipefail" in script
@@ -283,7 +281,7 @@ def test_the_gate_runs_the_test_command_of_readme() -> None:
         assert check in script
 
 
-def test_every_folder_of_tests_is_run_by_one_of_the_two_commands() -> None:
+def test_every_test_folder_is_run_by_one_of_two_commands() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     at_once = settings["tool"]["pytest"]["ini_options"]["testpaths"]
     folders = {f"tests/{found.parent.name}" for found in (ROOT / "tests").glob("*/test_*.py")}
@@ -294,7 +292,7 @@ def test_every_folder_of_tests_is_run_by_one_of_the_two_commands() -> None:
     assert re.search(rf"^layer {layer}.* tests/line$", CI.read_text("utf-8"), re.MULTILINE)
 
 
-def test_gate_runs_tests_that_test_command_omits() -> None:
+def test_gate_runs_tests_that_the_test_command_omits() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     options = settings["tool"]["pytest"]["ini_options"]
     assert options["addopts"].endswith(" -m 'not sweep'")
@@ -304,7 +302,7 @@ def test_gate_runs_tests_that_test_command_omits() -> None:
     assert re.search(rf"^layer {layer} .*-m sweep$", CI.read_text("utf-8"), re.MULTILINE)
 
 
-def test_links_of_readme_lead_somewhere() -> None:
+def test_links_of_readme_exist() -> None:
     targets = [t for t in re.findall(r"\]\(([^)]+)\)", README) if "://" not in t]
     assert targets
     missing = [t for t in targets if not (ROOT / t).exists()]
@@ -334,7 +332,7 @@ def test_readme_stays_short() -> None:
     assert len(re.findall(r"^drivepanel ", five, re.MULTILINE)) == 5
 
 
-def test_readme_leads_to_every_page() -> None:
+def test_readme_links_to_every_page() -> None:
     pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")}
     pages |= {"docs/screens/README.md", "docs/decisions", "profiles/README.md"}
     targets = {target.partition("#")[0] for target in re.findall(r"\]\(([^)]+)\)", README)}
@@ -350,7 +348,7 @@ def pins() -> dict[str, str]:
     return {canonicalize_name(m[1]): m[2] for m in matches if m}
 
 
-def test_every_package_that_the_project_needs_is_pinned() -> None:
+def test_every_required_package_is_pinned() -> None:
     import tomli
 
     project = tomli.loads((ROOT / "pyproject.toml").read_text())["project"]
@@ -383,7 +381,7 @@ def test_values_become_text_in_one_place() -> None:
     assert found == {"drive/shown.py"}
 
 
-def test_nothing_in_the_project_names_this_machine() -> None:
+def test_no_file_names_this_machine() -> None:
     listed = run("git", "ls-files")
     if listed.returncode != 0:
         pytest.skip("not a git checkout")
@@ -398,14 +396,12 @@ def test_nothing_in_the_project_names_this_machine() -> None:
     assert found == []
 
 
-def test_the_test_run_keeps_out_of_the_users_folders(tmp_path: Path) -> None:
+def test_tests_do_not_use_the_user_folders(tmp_path: Path) -> None:
     for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
         assert Path(os.environ[name]).is_relative_to(tmp_path)
 
 
-def test_a_test_that_hangs_fails_and_the_run_goes_on(
-    tmp_path: Path, pytestconfig: pytest.Config
-) -> None:
+def test_hung_test_fails_and_the_run_continues(tmp_path: Path, pytestconfig: pytest.Config) -> None:
     assert 0 < float(pytestconfig.getini("timeout")) <= 600
     (tmp_path / "test_hanging.py").write_text(
         "import asyncio, threading\n"

@@ -160,13 +160,13 @@ def lost_links(path: Path, text: str) -> Iterator[str]:
             yield target
 
 
-def test_there_are_documents() -> None:
+def test_documents_are_found() -> None:
     names = {path.relative_to(ROOT).as_posix() for path in DOCUMENTS}
     assert {"docs/architecture.md", "docs/glossary.md", "CONTRIBUTING.md"} <= names
     assert len([name for name in names if name.startswith("docs/decisions/")]) >= 9
 
 
-def test_the_documents_name_what_is_there() -> None:
+def test_documents_name_existing_things_only() -> None:
     """One test for all documents, as the search for names parses the whole source first."""
     found = {}
     for path in DOCUMENTS:
@@ -175,7 +175,7 @@ def test_the_documents_name_what_is_there() -> None:
     assert {name: reported for name, reported in found.items() if reported} == {}
 
 
-def test_the_check_sees_what_it_is_for() -> None:
+def test_wrong_names_fail_the_check() -> None:
     wrong = (
         "`Lyne`",
         "`Line.reed`",
@@ -202,7 +202,7 @@ def test_the_check_sees_what_it_is_for() -> None:
     assert list(faults("```\nLyne `Lyne`\n```")) == []
 
 
-def test_a_link_that_leads_nowhere_is_seen(tmp_path: Path) -> None:
+def test_broken_link_is_found(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("# A head, and more\n", "utf-8")
     reported = "[a](page.md) [b](page.md#a-head-and-more) [c](https://example.org/x)"
@@ -227,28 +227,28 @@ def rooms_that_know_a_family(package: Path) -> set[str]:
     }
 
 
-def test_every_room_that_knows_a_family_is_reported() -> None:
+def test_every_package_that_knows_a_family_is_listed() -> None:
     text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
     section = text.partition(f"\n## {HOLDS_FAMILIES}")[2].partition("\n## ")[0]
     reported = {span for span in SPAN.findall(section) if span.startswith("tui")}
     assert rooms_that_know_a_family(ROOT / "tui") - reported == set()
 
 
-def test_a_room_that_knows_a_family_is_seen(tmp_path: Path) -> None:
+def test_package_that_knows_a_family_is_found(tmp_path: Path) -> None:
     for room in ("bus", "simulator"):
         (tmp_path / "tui" / room).mkdir(parents=True)
         (tmp_path / "tui" / room / "new.py").write_text('if profile.id == "atv71": pass', "utf-8")
     assert rooms_that_know_a_family(tmp_path / "tui") == {"tui/bus"}
 
 
-def test_readme_leads_to_the_documents() -> None:
+def test_readme_links_to_the_documents() -> None:
     readme = (ROOT / "README.md").read_text("utf-8")
     targets = set(LINK.findall(readme))
     wanted = {"docs/architecture.md", "docs/decisions", "docs/glossary.md"}
     assert wanted | {"CONTRIBUTING.md", "CHANGELOG.md"} <= targets
 
 
-def test_every_decision_stands_in_the_list() -> None:
+def test_every_decision_is_in_the_list() -> None:
     index = (ROOT / "docs" / "decisions" / "README.md").read_text("utf-8")
     pages = {path.name for path in (ROOT / "docs" / "decisions").glob("*.md")} - {"README.md"}
     assert set(LINK.findall(index)) == pages

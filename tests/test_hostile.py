@@ -23,12 +23,12 @@ def quiet() -> Iterator[None]:
     logging.disable(logging.NOTSET)
 
 
-def test_every_kind_of_case_is_run_here() -> None:
+def test_every_kind_of_case_is_run() -> None:
     assert set(ROUNDS) == set(CASES)
 
 
 @pytest.mark.parametrize("kind", ROUNDS)
-def test_whatever_is_brought_ends_in_a_sentence(
+def test_damaged_input_ends_in_a_sentence(
     kind: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """`python -m benchmarks.hostile` runs 10 000 of these; the number of a case is its seed."""
@@ -43,14 +43,14 @@ def test_whatever_is_brought_ends_in_a_sentence(
             raise AssertionError(f"{kind} {number} of seed {SEED}") from error
 
 
-def test_wounds_wound() -> None:
+def test_mutations_change_the_text() -> None:
     text = b'[a]\nname = "x"\nraw = 3\n' * 5
     chance = random.Random(1)
     same = [mutated(text, chance) == text for _ in range(200)]
     assert sum(same) < 20
 
 
-def test_a_command_to_the_terminal_is_seen() -> None:
+def test_control_characters_fail_the_check() -> None:
     no_commands("plain\n")
     with pytest.raises(AssertionError):
         no_commands("\x9b2J")

@@ -17,34 +17,34 @@ from tests.programs import PATIENCE
 SLOW = Link(2_000, 0.3)
 
 
-def test_bytes_are_carried_one_after_another_at_the_rate() -> None:
+def test_bytes_are_carried_at_the_rate_of_the_link() -> None:
     pace = Pace(SLOW)
     assert pace.carried(10.0, 200) == pytest.approx(10.1)
     assert pace.carried(10.0, 100) == pytest.approx(10.15)
 
 
-def test_a_rest_saves_nothing_up() -> None:
+def test_idle_link_accumulates_no_capacity() -> None:
     pace = Pace(SLOW)
     pace.carried(10.0, 200)
     assert pace.carried(60.0, 2_000) == pytest.approx(61.0)
 
 
-def test_bytes_are_half_a_round_trip_on_their_way() -> None:
+def test_bytes_take_half_a_round_trip() -> None:
     pace = Pace(SLOW)
     assert pace.arrival(pace.carried(10.0, 200)) == pytest.approx(10.25)
 
 
-def test_a_link_without_a_limit_is_free_at_once() -> None:
+def test_link_without_a_limit_is_free_immediately() -> None:
     pace = Pace(Link())
     assert pace.arrival(pace.carried(10.0, 1_000_000)) == 10.0
 
 
-def test_a_shaped_link_takes_small_pieces() -> None:
+def test_limited_link_sends_small_pieces() -> None:
     assert SLOW.piece == PIECE < Link().piece
 
 
 @pytest.mark.parametrize("link", [Link(), Link(1_000_000, 0.02)], ids=["no limit", "shaped"])
-def test_output_is_whole_and_in_order(link: Link) -> None:
+def test_output_is_complete_and_in_order(link: Link) -> None:
     sent = bytes(range(256)) * 200
     with echo() as port, Proxy(port, link).at_work() as proxy, connected(proxy) as end:
         threading.Thread(target=end.sendall, args=(sent,), daemon=True).start()
@@ -52,7 +52,7 @@ def test_output_is_whole_and_in_order(link: Link) -> None:
         assert (proxy.up, proxy.down) == (len(sent), len(sent))
 
 
-def test_nothing_comes_back_before_the_round_trip() -> None:
+def test_nothing_is_echoed_before_the_round_trip() -> None:
     link = Link(10_000, 0.1)
     with echo() as port, Proxy(port, link).at_work() as proxy, connected(proxy) as end:
         began = time.monotonic()
@@ -62,7 +62,7 @@ def test_nothing_comes_back_before_the_round_trip() -> None:
         assert time.monotonic() - began >= 0.1 + 2 * 0.01
 
 
-def test_a_cut_link_ends_at_both_sides() -> None:
+def test_cut_link_ends_on_both_sides() -> None:
     with echo() as port, Proxy(port, SLOW).at_work() as proxy, connected(proxy) as end:
         end.sendall(b"one")
         received(end, 3)
@@ -70,7 +70,7 @@ def test_a_cut_link_ends_at_both_sides() -> None:
         assert end.recv(1) == b""
 
 
-def test_a_picture_owes_the_place_of_its_cursor_to_who_asks() -> None:
+def test_picture_answers_cursor_position_requests() -> None:
     picture = Picture(80, 24)
     picture.feed(b"\x1b[5;7Hab\x1b[6n\x1b[?6n\x1b[5n")
     assert picture.answers == ["\x1b[5;9R"]

@@ -127,7 +127,7 @@ def without_lock(tree: ast.ClassDef) -> dict[str, set[str]]:
     return found
 
 
-def test_class_with_a_lock_changes_nothing_without_it() -> None:
+def test_class_with_a_lock_changes_state_only_under_it() -> None:
     classes = [
         node
         for room in ROOMS
@@ -140,7 +140,7 @@ def test_class_with_a_lock_changes_nothing_without_it() -> None:
     assert found == {name: set(used.split()) for name, (used, _) in WITHOUT_LOCK.items()}
 
 
-def test_no_thread_keeps_its_program_from_ending() -> None:
+def test_threads_do_not_block_the_exit() -> None:
     keeping = set()
     for path, call in calls_of("Thread"):
         daemon = next((word.value for word in call.keywords if word.arg == "daemon"), None)

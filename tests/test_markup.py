@@ -140,7 +140,7 @@ def test_no_text_is_markup() -> None:
         "path.read_text()",
     ],
 )
-def test_the_check_sees_what_it_is_for(line: str) -> None:
+def test_markup_fails_the_check(line: str) -> None:
     assert list(faults(parsed(line), PACKAGE / "screens" / "new.py"))
 
 

@@ -31,24 +31,24 @@ def copy(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_a_defect_is_found_wherever_it_stands_in_its_room(copy: Path) -> None:
+def test_defect_is_found_anywhere_in_its_package(copy: Path) -> None:
     assert place_of(defect("x = 1"), copy).name == "two.py"
     assert place_of(defect("x / 2", room="room/one.py"), copy).name == "one.py"
 
 
 @pytest.mark.parametrize("old", ["x * 2", "x", "return"])
-def test_a_text_that_does_not_stand_once_is_stale(copy: Path, old: str) -> None:
+def test_text_that_does_not_occur_once_is_stale(copy: Path, old: str) -> None:
     (copy / "room" / "deep" / "two.py").write_text("return\n")
     with pytest.raises(Stale):
         place_of(defect(old), copy)
 
 
-def test_a_room_that_has_gone_is_stale(copy: Path) -> None:
+def test_defect_in_a_removed_package_is_stale(copy: Path) -> None:
     with pytest.raises(Stale):
         place_of(defect("x / 2", room="gone"), copy)
 
 
-def test_the_copy_is_whole_again_whatever_happens(copy: Path) -> None:
+def test_copy_is_always_restored(copy: Path) -> None:
     path = copy / "room" / "one.py"
     with planted(defect("x / 2", "x * 2"), copy):
         assert "x * 2" in path.read_text()
@@ -72,16 +72,18 @@ def test_the_copy_is_whole_again_whatever_happens(copy: Path) -> None:
         (-1, "", "a hang"),
     ],
 )
-def test_only_a_test_that_ran_and_failed_has_noticed(status: int, output: str, by: str) -> None:
+def test_only_a_test_that_ran_and_failed_detects_a_defect(
+    status: int, output: str, by: str
+) -> None:
     assert judge(status, output).startswith(by)
 
 
-def test_the_text_of_every_defect_stands_in_its_room() -> None:
+def test_text_of_every_defect_occurs_in_its_package() -> None:
     for defect in DEFECTS:
         assert place_of(defect, ROOT).is_file(), defect.name
 
 
-def test_every_defect_has_a_name_a_sentence_and_tests_that_are_there() -> None:
+def test_every_defect_has_a_name_a_sentence_and_existing_tests() -> None:
     assert len({defect.name for defect in DEFECTS}) == len(DEFECTS) >= 44
     for defect in DEFECTS:
         assert defect.suffers.endswith("."), defect.name
@@ -177,7 +179,7 @@ def test_each_random_defect_compiles_and_changes_its_module(path: Path) -> None:
         assert ast.dump(ast.parse(mutant.apply(source))) != whole, mutant.identity
 
 
-def test_identity_of_a_random_defect_stays_where_lines_move() -> None:
+def test_identity_of_a_random_defect_survives_moved_lines() -> None:
     moved = [mutant.identity for mutant in mutants_of(MODULE.replace("LONGEST", "\n\nLONGEST"))]
     assert moved == [mutant.identity for mutant in mutants_of(MODULE)]
 
@@ -206,7 +208,7 @@ def test_a_test_that_was_renamed_is_found_by_its_body() -> None:
     assert new_names(before, [*new, *before]) == {}
 
 
-def test_constant_is_tried_by_the_functions_that_use_it() -> None:
+def test_constant_is_tested_by_functions_that_use_it() -> None:
     path = "tui/session/proof/silences.py"
     lines = (ROOT / path).read_text("utf-8").splitlines()
     used = next(n for n, line in enumerate(lines, 1) if "max(LONGEST_SILENCE" in line)

@@ -25,7 +25,7 @@ def public(tree: ast.Module) -> Iterator[str]:
                 yield name
 
 
-def test_no_public_name_stands_for_two_things() -> None:
+def test_every_public_name_has_one_meaning() -> None:
     where = defaultdict(list)
     for path in modules():
         for name in public(tree_of(path)):

@@ -72,7 +72,7 @@ def test_no_module_names_a_family() -> None:
     assert [known for path in FILES for known in known_families(path)] == []
 
 
-def test_the_table_of_what_python_knows_is_empty() -> None:
+def test_page_lists_no_family_known_to_python() -> None:
     text = (TUI.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
     part = text.split("## Where Python still knows a family")[1].split("\n## ")[0]
     assert [line for line in part.splitlines() if line.startswith("|")] == []
@@ -92,5 +92,5 @@ def test_planted_defect_is_found(
     assert known_families(module) != []
 
 
-def test_quantities_are_no_codes() -> None:
+def test_quantities_are_not_codes() -> None:
     assert not {quantity for quantity in get_args(Quantity) if quantity in CODES}

@@ -56,7 +56,7 @@ def metadata(folder: Path, address: str = "") -> Message:
 # The page of a package
 
 
-def test_a_package_page_has_no_picture_and_no_link_that_leads_nowhere(tmp_path: Path) -> None:
+def test_package_page_has_no_broken_picture_or_link(tmp_path: Path) -> None:
     reported = metadata(tmp_path)
     page = reported.get_payload()
     assert isinstance(page, str)
@@ -66,7 +66,7 @@ def test_a_package_page_has_no_picture_and_no_link_that_leads_nowhere(tmp_path: 
     assert reported.get_all("Project-URL") is None
 
 
-def test_with_an_address_pictures_and_links_lead_to_their_version(tmp_path: Path) -> None:
+def test_pictures_and_links_point_to_their_version(tmp_path: Path) -> None:
     reported = metadata(tmp_path, ADDRESS)
     page = reported.get_payload()
     assert isinstance(page, str)
@@ -84,13 +84,13 @@ def test_with_an_address_pictures_and_links_lead_to_their_version(tmp_path: Path
     assert {"Homepage", "Documentation", "Changelog", "Issues", "Source"} <= urls.keys()
 
 
-def test_existing_link_stays() -> None:
+def test_existing_link_is_unchanged() -> None:
     text = "[a](https://code.example/x) [b](#keys) [c](mailto:a@b.example) `[lines]`"
     for address in ("", ADDRESS):
         assert as_on_a_package_page(text, address, "1") == text
 
 
-def test_nothing_is_named_as_supported_that_was_never_proved() -> None:
+def test_only_tested_platforms_are_named_as_supported() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     systems = [item for item in project["classifiers"] if item.startswith("Operating System")]
     assert systems == ["Operating System :: POSIX :: Linux"]
@@ -110,7 +110,7 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-def test_a_source_package_holds_all_that_is_in_the_repository(unpacked: Path) -> None:
+def test_source_package_contains_the_whole_repository(unpacked: Path) -> None:
     listed = subprocess.run(
         ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False
     )
@@ -122,7 +122,7 @@ def test_a_source_package_holds_all_that_is_in_the_repository(unpacked: Path) ->
 
 
 @pytest.mark.sweep  # the gate does it, too
-def test_a_source_package_passes_tests_of_its_own(unpacked: Path) -> None:
+def test_source_package_passes_its_own_tests(unpacked: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"]
     part = ["tests/wire", "tests/drive/test_library.py", "tests/drive/test_values.py"]
     done = subprocess.run(
@@ -140,11 +140,11 @@ def test_a_source_package_passes_tests_of_its_own(unpacked: Path) -> None:
 # The manual page
 
 
-def test_the_manual_page_is_what_the_commands_say() -> None:
+def test_manual_page_matches_the_commands() -> None:
     assert PAGE.read_text("utf-8") == man_page(), "python -m tui.cli.derived"
 
 
-def test_the_manual_page_has_every_command_and_option() -> None:
+def test_manual_page_has_every_command_and_option() -> None:
     page = man_page()
     top = click.Context(main)
     for name in main.list_commands(top):
@@ -166,17 +166,17 @@ def test_the_manual_page_has_every_command_and_option() -> None:
         ("plain", "plain"),
     ],
 )
-def test_no_text_is_a_command_to_roff(text: str, roff: str) -> None:
+def test_no_text_is_a_roff_command(text: str, roff: str) -> None:
     assert _text(text) == roff
 
 
-def test_a_table_stays_as_it_stands() -> None:
+def test_table_is_kept_as_it_is() -> None:
     assert list(_paragraphs("one\ntwo\n\n\b\na  b\n.c\n")) == [
         "one two", ".PP", ".nf", "a  b", "\\&.c", ".fi",
     ]  # fmt: skip
 
 
-def test_roff_has_nothing_to_say_against_the_manual_page() -> None:
+def test_roff_accepts_the_manual_page() -> None:
     groff = shutil.which("groff")
     if groff is None:
         pytest.skip("groff is not here")

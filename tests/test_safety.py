@@ -160,7 +160,7 @@ class Loop:
         return self.now
 
 
-def test_programs_have_two_seconds_to_come_back_and_six_at_most() -> None:
+def test_programs_have_two_to_six_seconds_to_reconnect() -> None:
     assert 1.7 < Loop().waited(greets=False) < 2.3
     assert 5.7 < Loop().waited(greets=True) < 6.3
 
@@ -307,7 +307,7 @@ def owner_watch(now: Now) -> OwnerWatch:
 
 
 @pytest.mark.parametrize(("gap", "awake"), [(0.25, True), (0.35, False)])
-def test_program_was_awake_if_it_looked_each_third_of_a_second(gap: float, awake: bool) -> None:
+def test_program_was_awake_if_it_checked_each_third_of_a_second(gap: float, awake: bool) -> None:
     now = Now()
     watch = owner_watch(now)
     for _ in range(3):
@@ -328,7 +328,7 @@ async def test_owner_that_was_suspended_for_more_than_0_7_seconds_sends_stops_on
     sender.close()
 
 
-def test_client_is_looked_for_ten_times_before_it_counts_as_frozen() -> None:
+def test_client_is_checked_ten_times_before_it_counts_as_frozen() -> None:
     """A computer that is short of time may give no turn to a program that is well."""
     assert 8 <= heartbeat.LOOKS_IN_VAIN <= 12
 
@@ -356,7 +356,7 @@ class Thread:
 
 
 @pytest.mark.parametrize(("after", "beats"), [(2.8, 1), (3.2, 0)])
-def test_heartbeat_ends_once_the_loop_has_not_turned_for_three_seconds(
+def test_heartbeat_ends_if_the_loop_hangs_for_three_seconds(
     after: float, beats: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now, thread = Now(), Thread()

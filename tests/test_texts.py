@@ -339,7 +339,7 @@ def run(motor: int) -> None:
     assert by_kind["L"] == {"Show X."}
 
 
-def test_prose_leaves_code_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_prose_excludes_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
     page = tmp_path / "page.md"
     page.write_text(
@@ -350,7 +350,7 @@ def test_prose_leaves_code_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     ]  # fmt: skip
 
 
-def test_texts_of_profile_leave_quotes_of_manuals_out(
+def test_texts_of_a_profile_exclude_manual_quotes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)

@@ -71,7 +71,7 @@ def unused(trees: dict[str, ast.Module]) -> list[str]:
     ]
 
 
-def test_nothing_is_kept_that_nothing_uses() -> None:
+def test_every_name_is_used() -> None:
     trees = {path.relative_to(PACKAGE).as_posix(): tree_of(path) for path in modules()}
     assert unused(trees) == [], "take it out, with the tests that only try it"
 

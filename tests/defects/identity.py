@@ -158,6 +158,6 @@ DEFECTS = (
         "worst = max(worst, LINE_TROUBLE)",
         "worst = max(worst, 0)",
         "A script takes a motor whose drive did not answer for stopped.",
-        ("tests/line/test_commands.py::test_stop_all_stops_each",),
+        ("tests/line/test_commands.py::test_stop_all_stops_every_drive",),
     ),
 )

@@ -21,7 +21,7 @@ DEFECTS = (
         "termios.TCSANOW",
         "termios.TCSADRAIN",
         "Opening a port to listen waits for its output, and so affects it.",
-        ("tests/line/test_listening.py::test_no_write_no_break_no_drain_reaches_the_port",),
+        ("tests/line/test_listening.py::test_monitoring_sends_nothing_to_the_port",),
     ),
     Defect(
         "listener-shares-the-port",

@@ -178,7 +178,7 @@ DEFECTS = (
         "line = line[os.write(stream.fileno(), line) :]",
         "stream.write(line.decode()); stream.flush(); line = b''",
         "A program aborts at its end if nothing reads the output of one of its threads.",
-        (f"{INPUTS}::test_it_ends_well_while_nobody_reads_what_it_says",),
+        (f"{INPUTS}::test_simulate_ends_normally_with_unread_output",),
     ),
     Defect(
         "cancelled-write-goes-on",

@@ -97,7 +97,7 @@ DEFECTS = (
         "        while self._needed:\n            await asyncio.sleep(CARE_INTERVAL)\n",
         "        while True:\n            await asyncio.sleep(CARE_INTERVAL)\n",
         "A port stays in use after the last program has left the line.",
-        ("tests/line/test_keeper.py::test_the_port_is_free_when_the_last_program_has_ended",),
+        ("tests/line/test_keeper.py::test_port_is_free_after_the_last_program_has_exited",),
     ),
     Defect(
         "keeper-knows-nothing-of-the-one-before",
@@ -105,7 +105,7 @@ DEFECTS = (
         "set_programs(self._keeping.before)",
         "set_programs(())",
         "A motor keeps running whose program died together with the keeper of its line.",
-        ("tests/line/test_keeper.py::test_the_motor_stops_when_its_program_dies_with_the_keeper",),
+        ("tests/line/test_keeper.py::test_motor_stops_if_its_program_dies_with_the_keeper",),
     ),
     Defect(
         "keeper-has-the-output-of-a-command",
@@ -113,7 +113,7 @@ DEFECTS = (
         "stdout=subprocess.DEVNULL",
         "stdout=None",
         "A shell waits for the output of a command until the keeper ends.",
-        ("tests/line/test_keeper.py::test_it_inherits_nothing_and_outlives_its_command",),
+        ("tests/line/test_keeper.py::test_keeper_inherits_nothing_and_outlives_its_command",),
     ),
     Defect(
         "keeper-without-an-alarm",
@@ -121,7 +121,7 @@ DEFECTS = (
         "signal.signal(signal.SIGALRM, signal.SIG_DFL)",
         "signal.signal(signal.SIGALRM, signal.SIG_IGN)",
         "A keeper that was frozen continues with outdated work.",
-        (f"{HUNG}::test_a_keeper_that_was_frozen_ends_itself_when_it_goes_on",),
+        (f"{HUNG}::test_resumed_frozen_keeper_exits",),
     ),
     Defect(
         "keeper-alarm-not-renewed",
@@ -129,7 +129,7 @@ DEFECTS = (
         "                await asyncio.sleep(ALARM_RENEWED)\n",
         "                await asyncio.sleep(2 * ALARM_AFTER)\n",
         "Each keeper ends after two seconds.",
-        (f"{HUNG}::test_a_program_that_was_frozen_itself_kills_no_keeper",),
+        (f"{HUNG}::test_program_that_was_frozen_kills_no_keeper",),
     ),
     Defect(
         "stops-not-acknowledged",
@@ -137,7 +137,7 @@ DEFECTS = (
         "            self.say(Alive())\n",
         "            pass\n",
         "Each stop costs the line its keeper.",
-        (f"{HUNG}::test_a_keeper_that_is_well_is_kept_after_stops",),
+        (f"{HUNG}::test_healthy_keeper_is_kept_after_stops",),
     ),
     Defect(
         "panel-killed-for-a-keeper",
@@ -169,7 +169,7 @@ DEFECTS = (
         "error_from(news.failure) if news.failure is not None else None",
         "None",
         "The panel waits for a missing port instead of reporting it.",
-        ("tests/line/test_keeper.py::test_a_port_that_is_not_there_is_reported_at_once",),
+        ("tests/line/test_keeper.py::test_missing_port_is_reported_immediately",),
     ),
     Defect(
         "stop-waits-without-a-word",

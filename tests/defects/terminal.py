@@ -13,7 +13,7 @@ DEFECTS = (
         "*cut, self._last = self._cut",
         "*cut, _ = self._cut",
         "After Esc and [, digits and the next letter are ignored: k does not stop.",
-        ("tests/terminal/test_dialects.py::test_reports_keep_no_sequence_waiting",),
+        ("tests/terminal/test_dialects.py::test_reports_do_not_keep_a_sequence_waiting",),
     ),
     Defect(
         "reply-without-backslash-takes-the-next-escape",
@@ -80,9 +80,6 @@ DEFECTS = (
         "        os.kill(os.getpid(), signal.SIGHUP)\n",
         "",
         "A panel that lost its terminal keeps its motor running, without a person.",
-        (
-            "tests/terminal/test_driver.py"
-            "::test_a_terminal_that_is_gone_ends_the_panel_as_the_system_does",
-        ),
+        ("tests/terminal/test_driver.py::test_lost_terminal_ends_the_panel_with_a_hangup",),
     ),
 )

@@ -171,7 +171,7 @@ DEFECTS = (
         'reference = texts.get(REFERENCE, "")',
         'reference = texts.get(NAME, "")',
         "A drive is identified as another family, and its words have other meanings.",
-        ("tests/line/test_on_a_line.py::test_identify",),
+        ("tests/line/test_on_a_line.py::test_drives_of_every_family_are_identified",),
     ),
     Defect(
         "fault-from-the-wrong-word",

@@ -93,7 +93,7 @@ def attacked(attack: Callable[[Place, Random], None], place: Place, count: int) 
 
 
 @pytest.mark.parametrize("attack", [noise, halves, reads, stops])
-def test_stop_passes_an_attack_on_modbus_tcp(attack: Callable[[Place, Random], None]) -> None:
+def test_stop_works_during_an_attack_on_modbus_tcp(attack: Callable[[Place, Random], None]) -> None:
     with bench(ENABLED, DriveSpec("atv71", 2, sets={"CHCF": 1})) as (simulation, line):
         command = serving(line, "--tcp", "127.0.0.1:0", "--allow-commands")
         with served(command, ready="Ready:") as program, ExitStack() as stack:
@@ -114,7 +114,7 @@ def test_stop_passes_an_attack_on_modbus_tcp(attack: Callable[[Place, Random], N
             assert simulation.drive(1).fault is None
 
 
-def test_scrape_passes_an_attack_on_metrics() -> None:
+def test_scrape_works_during_an_attack_on_metrics() -> None:
     with bench(ENABLED) as (_, line):
         command = serving(f"{line}@1", "--metrics", "127.0.0.1:0")
         with served(command, ready="Ready:") as program, ExitStack() as stack:

@@ -43,7 +43,7 @@ NO_BENCHMARK = {"broken_panel", "chaos_plant", "faulty_line", "in_place", "link_
 """Programs that benchmarks start."""
 
 
-def test_every_benchmark_is_run_or_named() -> None:
+def test_every_benchmark_is_run_or_excluded_by_name() -> None:
     begun = {
         path.stem for path in BENCHMARKS.glob("*.py") if "\ndef main(" in path.read_text("utf-8")
     }
@@ -51,7 +51,7 @@ def test_every_benchmark_is_run_or_named() -> None:
 
 
 @pytest.mark.parametrize("name", SMALL)
-def test_a_benchmark_runs_to_its_figures(name: str, tmp_path: Path) -> None:
+def test_short_benchmark_prints_its_figures(name: str, tmp_path: Path) -> None:
     if name == "keys" and shutil.which("tmux") is None:
         need_peer("tmux is not here; it comes with the package tmux.")
     done = subprocess.run(

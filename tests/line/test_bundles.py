@@ -52,9 +52,7 @@ def fields(tshark: str, capture: Path, *names: str) -> list[list[str]]:
     return [line.split("\t") for line in done.stdout.splitlines()]
 
 
-def test_frames_of_another_program_from_before_are_read_by_tshark(
-    peer: Peer, tmp_path: Path
-) -> None:
+def test_tshark_reads_earlier_frames_of_another_program(peer: Peer, tmp_path: Path) -> None:
     tshark = peer("tshark", "tshark")
     with Simulation([DriveSpec("atv71", 1)]) as simulation:
         line = rtu_tcp(simulation)
@@ -76,7 +74,7 @@ def test_frames_of_another_program_from_before_are_read_by_tshark(
     assert {"watch", "bundle", "keeper"} == {program["program"] for program in programs}
 
 
-def test_running_motor_goes_on_and_nothing_is_written(tmp_path: Path) -> None:
+def test_bundle_writes_nothing_and_keeps_the_motor_running(tmp_path: Path) -> None:
     with Simulation([DriveSpec("atv71", 1)]) as simulation:
         writes: list[bytes] = []
         side = simulation.drive(1).line_side

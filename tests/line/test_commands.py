@@ -74,7 +74,7 @@ def besides(output: str) -> str:
 
 
 @pytest.mark.parametrize("ending", SIGNALS)
-def test_a_signal_stops_the_motor_on_its_ramp(ending: signal.Signals) -> None:
+def test_signal_stops_the_motor_on_its_ramp(ending: signal.Signals) -> None:
     with bench() as (simulation, line), running(line) as program:
         wait_until(lambda: turns(simulation), "the motor turns")
         program.process.send_signal(ending)
@@ -86,7 +86,7 @@ def test_a_signal_stops_the_motor_on_its_ramp(ending: signal.Signals) -> None:
         assert simulation.drive(1).fault is None
 
 
-def test_a_second_ctrl_c_does_not_leave_the_motor_running() -> None:
+def test_second_ctrl_c_does_not_leave_the_motor_running() -> None:
     with (
         bench(DriveSpec("atv71", 1, sets={"DEC": 50})) as (simulation, line),
         running(line) as program,
@@ -102,7 +102,7 @@ def test_a_second_ctrl_c_does_not_leave_the_motor_running() -> None:
         assert stands(simulation)
 
 
-def test_a_ctrl_c_before_the_motor_runs_leaves_none_running() -> None:
+def test_ctrl_c_before_the_motor_runs_leaves_none_running() -> None:
     with bench() as (simulation, line):
         command = (*DRIVEPANEL, "run", line, "--reference", "20Hz", "--arm")
         with served(command, ready="Reference 20") as program:
@@ -112,7 +112,7 @@ def test_a_ctrl_c_before_the_motor_runs_leaves_none_running() -> None:
         assert simulation.drive(1).fault is None
 
 
-def test_a_closed_output_stops_the_motor() -> None:
+def test_closed_output_stops_the_motor() -> None:
     with bench() as (simulation, line), running(line) as program:
         wait_until(lambda: turns(simulation), "the motor turns")
         assert program.process.stdout is not None
@@ -122,7 +122,7 @@ def test_a_closed_output_stops_the_motor() -> None:
         program.process.stdout = None
 
 
-def test_an_output_that_nobody_reads_holds_up_no_stop() -> None:
+def test_unread_output_does_not_delay_a_stop() -> None:
     """A terminal held by Ctrl-S takes nothing; here a pipe that is full from the start."""
     reading, writing = os.pipe()
     with bench() as (simulation, line):
@@ -145,7 +145,7 @@ def test_an_output_that_nobody_reads_holds_up_no_stop() -> None:
 
 
 @pytest.mark.parametrize("family", ALTIVARS)
-def test_run_for_some_time(family: str) -> None:
+def test_run_for_a_time_stops_at_its_end(family: str) -> None:
     with bench(DriveSpec(family, 1)) as (simulation, line):
         run = ("run", line, "-p", family, "--reference", "20Hz", "--arm", "--for", "2")
         done = drivepanel(*run)
@@ -157,7 +157,7 @@ def test_run_for_some_time(family: str) -> None:
         assert simulation.drive(1).fault is None
 
 
-def test_run_reverse_in_json() -> None:
+def test_run_reverse_prints_json() -> None:
     with bench() as (simulation, line):
         run = ("run", line, "--reference", "20Hz", "--reverse", "--arm", "--for", "3", "--json")
         done = drivepanel(*run)
@@ -173,7 +173,7 @@ def test_run_reverse_in_json() -> None:
         assert stands(simulation)
 
 
-def test_the_watch_of_the_drive_is_fed() -> None:
+def test_run_keeps_the_drive_alive() -> None:
     """A timeout of 0.5 s passes several times between two lines of output."""
     with bench(DriveSpec("atv71", 1, sets={"TTO": 5})) as (simulation, line):
         command = [*DRIVEPANEL, "run", line, "--reference", "20Hz", "--arm"]
@@ -185,7 +185,7 @@ def test_the_watch_of_the_drive_is_fed() -> None:
             assert program.process.poll() is None
 
 
-def test_leave_running_leaves_it_running_and_says_what_the_drive_does() -> None:
+def test_leave_running_leaves_the_motor_running_and_names_the_timeout() -> None:
     with bench(DriveSpec("atv71", 1, sets={"SLL": 0})) as (simulation, line):
         run = ("run", line, "--reference", "20Hz", "--arm", "--for", "2", "--leave-running")
         done = drivepanel(*run)
@@ -202,7 +202,7 @@ def test_leave_running_leaves_it_running_and_says_what_the_drive_does() -> None:
 # run: what goes wrong
 
 
-def test_a_trip_ends_it_and_is_reported() -> None:
+def test_trip_ends_the_run_and_is_reported() -> None:
     with bench() as (simulation, line), running(line) as program:
         wait_until(lambda: turns(simulation), "the motor turns")
         simulation.drive(1).provoke("OCF")
@@ -212,7 +212,7 @@ def test_a_trip_ends_it_and_is_reported() -> None:
         assert stands(simulation)
 
 
-def test_a_motor_that_others_stop_ends_it() -> None:
+def test_motor_stopped_by_another_source_ends_the_run() -> None:
     with bench() as (simulation, line), running(line) as program:
         wait_until(lambda: turns(simulation), "the motor turns")
         simulation.drive(1).power_cycle()
@@ -225,7 +225,7 @@ def test_a_motor_that_others_stop_ends_it() -> None:
 
 
 @pytest.mark.parametrize("order", [[], ["--quick"], ["--freewheel"]])
-def test_a_stop_by_another_program_ends_it_and_is_reported(order: list[str]) -> None:
+def test_stop_by_another_program_ends_the_run_and_is_reported(order: list[str]) -> None:
     with Simulation([DriveSpec("atv71", 1)]) as simulation:
         host, port = simulation.serve_tcp()
         line = f"tcp:{host}:{port}"
@@ -267,9 +267,7 @@ LOSSES = {"unplugged": (Simulation.unplug, Simulation.replug), "silent": (silenc
 
 
 @pytest.mark.parametrize("loss", LOSSES)
-def test_a_lost_line_is_reported_and_the_motor_is_stopped_when_it_is_back(
-    loss: str, tmp_path: Path
-) -> None:
+def test_motor_is_stopped_when_a_lost_line_returns(loss: str, tmp_path: Path) -> None:
     lose, give_back = LOSSES[loss]
     spec = DriveSpec("atv71", 1, sets={"SLL": 0})
     with Simulation([spec]) as simulation:
@@ -352,7 +350,7 @@ def test_refused_reference_exits_with_4() -> None:
         assert "xception" in done.stderr
 
 
-def test_refused_run_command_leaves_motor_at_standstill_exits_with_4() -> None:
+def test_refused_run_command_exits_with_4_at_standstill() -> None:
     with bench() as (simulation, line):
         simulation.drive(1).registers.protect([simulation.drive(1).profile["CMD"]])
         done = drivepanel("run", line, "--reference", "30Hz", "--arm")
@@ -375,7 +373,7 @@ def test_reference_is_written_and_starts_nothing() -> None:
         assert stands(simulation)
 
 
-def test_reset_ends_a_fault_whose_cause_is_gone() -> None:
+def test_reset_clears_a_fault_without_a_cause() -> None:
     with bench(DriveSpec("atv71", 1, run_hz=20.0)) as (simulation, line):
         drive = simulation.drive(1)
         drive.provoke("OCF")
@@ -414,7 +412,7 @@ def test_stop_needs_no_arming(way: tuple[str, ...]) -> None:
         assert stands(simulation)
 
 
-def test_enabled_motor_at_0_hz_is_not_stopped_exits_with_4() -> None:
+def test_stop_of_an_enabled_motor_at_0_hz_exits_with_4() -> None:
     """Run at the terminals with reference 0: the next turn of the potentiometer turns it."""
     with bench(DriveSpec("atv71", 1, sets={"FR1": 1})) as (simulation, line):
         simulation.drive(1).run(0.0)
@@ -426,7 +424,7 @@ def test_enabled_motor_at_0_hz_is_not_stopped_exits_with_4() -> None:
         assert "Stop it at the machine" in done.stderr
 
 
-def test_stop_all_stops_each() -> None:
+def test_stop_all_stops_every_drive() -> None:
     specs = [DriveSpec(text, n, run_hz=20.0) for n, text in enumerate(("atv71", "atv21"), start=1)]
     with bench(*specs) as (simulation, line):
         wait_until(lambda: all(turns(simulation, n) for n in (1, 2)), "the motors turn")
@@ -438,7 +436,7 @@ def test_stop_all_stops_each() -> None:
         assert all(stands(simulation, n) for n in (1, 2))
 
 
-def test_stop_all_tells_which_it_could_not_stop_and_stops_the_others() -> None:
+def test_stop_all_names_drives_not_stopped_and_stops_the_others() -> None:
     # a drive that refuses to say who it is may be any family
     specs = [
         DriveSpec("atv21", 1, identity={1: "UNHEARD OF"}),
@@ -455,7 +453,7 @@ def test_stop_all_tells_which_it_could_not_stop_and_stops_the_others() -> None:
 
 
 @pytest.mark.parametrize("which", [("--all", "--addresses", "1,2"), ()])
-def test_a_drive_without_a_name_is_stopped_as_what_it_was_started_as(
+def test_unidentified_drive_is_stopped_by_its_recorded_family(
     which: tuple[str, ...],
 ) -> None:
     with bench(DriveSpec("proxidrive", 1, sets={"6.43": 1})) as (simulation, line):
@@ -467,7 +465,7 @@ def test_a_drive_without_a_name_is_stopped_as_what_it_was_started_as(
         assert stands(simulation)
 
 
-def test_drives_that_answer_are_stopped_before_silent_addresses_are_waited_for() -> None:
+def test_answering_drives_are_stopped_before_silent_addresses_time_out() -> None:
     with bench(DriveSpec("atv71", 10, run_hz=20.0)) as (simulation, line):
         wait_until(lambda: turns(simulation, 10), "the motor turns")
         command = [*DRIVEPANEL, "stop", line, "--all"]
@@ -487,13 +485,13 @@ def test_stop_all_without_answer_exits_with_3() -> None:
     assert "no answer at 5, 6." in done.stderr
 
 
-def test_a_way_to_stop_that_the_family_lacks_is_no_reason_not_to_stop() -> None:
+def test_stop_mode_missing_in_a_family_is_replaced() -> None:
     done = drivepanel("stop", "sim:powerdrive", "-p", "powerdrive", "--quick")
     assert done.returncode == 0, done.stdout + done.stderr
     assert "stopped (it has no quick stop: ramp stop)." in done.stdout
 
 
-def test_silent_addresses_of_a_search_are_no_failures() -> None:
+def test_silent_addresses_of_a_scan_are_not_failures() -> None:
     with bench(DriveSpec("atv71", 2, run_hz=20.0)) as (simulation, line):
         done = drivepanel("stop", line, "--all")
         assert done.returncode == 0, done.stderr
@@ -539,7 +537,7 @@ def test_stop_is_not_refused_for_a_wrong_profile() -> None:
         assert stands(simulation)
 
 
-def test_stop_all_goes_by_what_each_says_and_not_by_the_profile_named() -> None:
+def test_stop_all_uses_each_identification_not_the_named_profile() -> None:
     with bench(DriveSpec("atv71", 1, run_hz=20.0)) as (simulation, line):
         done = drivepanel("stop", line, "--all", "--addresses", "1", "-p", "powerdrive")
         assert done.returncode == 0, done.stderr
@@ -547,7 +545,7 @@ def test_stop_all_goes_by_what_each_says_and_not_by_the_profile_named() -> None:
         assert stands(simulation)
 
 
-def test_a_drive_of_no_known_kind_is_stopped_by_the_word_that_it_takes() -> None:
+def test_unknown_drive_is_stopped_by_the_word_it_accepts() -> None:
     spec = DriveSpec("atv21", 1, identity={1: "UNHEARD OF"}, run_hz=20.0)
     with bench(spec) as (simulation, line):
         wait_until(lambda: turns(simulation), "the motor turns")
@@ -580,7 +578,7 @@ def test_stop_with_named_profile_uses_no_other(own: bool) -> None:
         assert "Altivar 21" not in done.stdout + done.stderr
 
 
-def test_silent_drive_is_not_reported_as_stopped_exits_with_3() -> None:
+def test_stop_of_a_silent_drive_exits_with_3() -> None:
     with bench(DriveSpec("atv312", 1, run_hz=20.0)) as (simulation, line):
         silence(simulation)
         for named in ([], ["-p", "atv312"]):
@@ -591,7 +589,7 @@ def test_silent_drive_is_not_reported_as_stopped_exits_with_3() -> None:
 
 
 @pytest.mark.parametrize("way", [("--all", "--addresses", "1"), ("-d", "1", "-d", "2")])
-def test_stop_of_several_sends_a_silent_drive_the_word_of_its_profile(
+def test_stop_of_several_sends_a_silent_drive_its_profile_word(
     way: tuple[str, ...],
 ) -> None:
     """Its replies are lost, not what is sent to it."""
@@ -632,7 +630,7 @@ def test_stop_usage_exits_with_2(extra: tuple[str, ...]) -> None:
 # status
 
 
-def test_status_of_a_running_drive() -> None:
+def test_status_of_a_running_drive_is_shown() -> None:
     with bench(DriveSpec("atv71", 1, run_hz=30.0)) as (simulation, line):
         wait_until(lambda: simulation.drive(1).motor.frequency > 29, "the motor turns")
         done = drivepanel("status", line, "--json")
@@ -645,7 +643,7 @@ def test_status_of_a_running_drive() -> None:
         assert "coasts" in reported["watch"]["does"]
 
 
-def test_status_tells_a_fault_and_why_orders_have_no_effect() -> None:
+def test_status_shows_a_fault_and_why_commands_have_no_effect() -> None:
     with bench(DriveSpec("atv71", 1, sets={"CD1": 0, "CHCF": 2})) as (simulation, line):
         simulation.drive(1).provoke("OCF")
         wait_until(lambda: simulation.drive(1).fault is not None, "it tripped")
@@ -659,7 +657,7 @@ def test_status_tells_a_fault_and_why_orders_have_no_effect() -> None:
 
 
 @pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "powerdrive", "proxidrive"])
-def test_status_of_every_family(family: str) -> None:
+def test_status_of_every_family_is_shown(family: str) -> None:
     done = drivepanel("status", f"sim:{family}", "-p", family)
     assert (done.returncode, besides(done.stderr)) == (0, "")
     titles = [line[:17].strip() for line in done.stdout.splitlines()]
@@ -669,7 +667,7 @@ def test_status_of_every_family(family: str) -> None:
     ]  # fmt: skip
 
 
-def test_a_simulated_line_begins_with_the_settings_of_its_first_drive(tmp_path: Path) -> None:
+def test_simulated_line_uses_the_settings_of_its_first_drive(tmp_path: Path) -> None:
     """Who simulates a drive and reads it, names no baud and no format for it."""
     link = tmp_path / "line"
     with simulated("powerdrive@1", "--pty", str(link)) as there:

@@ -14,7 +14,7 @@ from .test_commands import bench
 Start = Callable[[list[str]], Terminal]
 
 
-def test_counters_beside_a_panel_are_those_of_both_and_a_reset_is_seen_there(
+def test_counters_include_a_panel_and_their_reset_is_shown_there(
     terminal_with: Start,
 ) -> None:
     with bench() as (_, line):

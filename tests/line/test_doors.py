@@ -29,7 +29,9 @@ if "tui.keeper" in sys.orig_argv:
 """
 
 
-def test_keeper_of_serve_imports_no_door(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_keeper_of_serve_imports_no_network_server(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "sitecustomize.py").write_text(AT_EXIT)
     loaded = tmp_path / "modules"
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))

@@ -29,9 +29,7 @@ ENDINGS = [signal.SIGINT, signal.SIGTERM]
 
 
 @pytest.mark.parametrize("ending", ENDINGS)
-def test_simulate_ends_cleanly_and_takes_its_link_away(
-    ending: signal.Signals, tmp_path: Path
-) -> None:
+def test_simulate_ends_cleanly_and_removes_its_link(ending: signal.Signals, tmp_path: Path) -> None:
     link = tmp_path / "line"
     with simulated("atv71@2", "--pty", str(link)) as simulation:
         assert link.is_symlink()
@@ -52,7 +50,7 @@ def test_simulate_listens_on_loopback_by_default(way: str) -> None:
         socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
 
 
-def test_simulate_does_not_take_the_place_of_a_file(tmp_path: Path) -> None:
+def test_simulate_does_not_replace_a_file(tmp_path: Path) -> None:
     taken = tmp_path / "notes.txt"
     taken.write_text("mine")
     done = drivepanel("simulate", "atv71", "--pty", str(taken))
@@ -60,7 +58,7 @@ def test_simulate_does_not_take_the_place_of_a_file(tmp_path: Path) -> None:
     assert taken.read_text() == "mine"
 
 
-def test_simulated_line_faults_are_seen_and_repeatable() -> None:
+def test_simulated_line_faults_are_repeatable() -> None:
     def statuses() -> list[int]:
         faults = ("--line-fault", "lost=0.5", "--seed", "7")
         with tcp_line("atv71@2", *faults) as line:
@@ -72,7 +70,7 @@ def test_simulated_line_faults_are_seen_and_repeatable() -> None:
     assert statuses() == first
 
 
-def test_ctrl_c_ends_watch_after_a_whole_line() -> None:
+def test_ctrl_c_ends_watch_after_a_complete_line() -> None:
     with served([*DRIVEPANEL, *WATCH], ready="{") as watching:
         assert set(json.loads(watching.ready)["values"]) == {"ETA"}
         watching.process.send_signal(signal.SIGINT)
@@ -104,7 +102,7 @@ INTERRUPTED = {
 
 
 @pytest.mark.parametrize("command", INTERRUPTED)
-def test_130_ctrl_c_with_what_was_written(
+def test_ctrl_c_exits_with_130_and_reports_what_was_written(
     command: str, silent_line: tuple[socket.socket, str], tmp_path: Path
 ) -> None:
     server, line = silent_line
@@ -130,7 +128,7 @@ def test_130_ctrl_c_with_what_was_written(
 
 
 @pytest.mark.parametrize("command", [WATCH, ("profiles", "atv71"), ("profiles", "atv71", "--json")])
-def test_a_reader_that_goes_away_is_no_error(command: tuple[str, ...]) -> None:
+def test_closed_reader_is_not_an_error(command: tuple[str, ...]) -> None:
     process = subprocess.Popen(
         [*DRIVEPANEL, *command],
         stdin=subprocess.DEVNULL,
@@ -153,7 +151,7 @@ def test_a_reader_that_goes_away_is_no_error(command: tuple[str, ...]) -> None:
     assert (status, output) == (0, "")
 
 
-def test_watch_writes_a_csv_file_beside(tmp_path: Path) -> None:
+def test_watch_also_writes_a_csv_file(tmp_path: Path) -> None:
     path = tmp_path / "watch.csv"
     watch = ("watch", "sim:atv71@2", "-d", "2", "RFR", "ETA", "--every", "0.1", "--count", "3")
     done = drivepanel(*watch, "--csv", str(path), "--json")
@@ -166,7 +164,7 @@ def test_watch_writes_a_csv_file_beside(tmp_path: Path) -> None:
     assert [row[1] for row in rows] == [cycle["values"]["RFR"]["text"] for cycle in printed]
 
 
-def test_the_table_shows_the_three_notations() -> None:
+def test_table_shows_the_three_notations() -> None:
     done = drivepanel("read", "sim:atv71@2", "-d", "2", "acc", "rfr")
     assert done.returncode == 0, done.stderr
     row = next(line for line in done.stdout.splitlines() if line.startswith("ACC"))
@@ -175,7 +173,7 @@ def test_the_table_shows_the_three_notations() -> None:
 
 
 @pytest.mark.parametrize("width", [72, 80, 120])
-def test_a_narrow_terminal_cuts_names_and_never_a_number(width: int) -> None:
+def test_narrow_terminal_cuts_names_but_never_numbers(width: int) -> None:
     profile = library.load("atv71")
     codes = monitoring_codes(profile)
     readings = {
@@ -193,7 +191,7 @@ def test_a_narrow_terminal_cuts_names_and_never_a_number(width: int) -> None:
             assert f" {part} " in f" {line} "
 
 
-def test_the_panel_is_not_drawn_into_a_file(tmp_path: Path) -> None:
+def test_panel_is_not_drawn_into_a_file(tmp_path: Path) -> None:
     """`2>file` swallowed the whole panel, and its keys went on working unseen."""
     output = tmp_path / "said"
     near, far = os.openpty()

@@ -11,7 +11,7 @@ Start = Callable[[list[str]], Terminal]
 PANEL = [sys.executable, "-m", "tui"]
 
 
-def test_f12_is_tried_once_while_no_line_is_open(
+def test_f12_is_tested_once_while_no_line_is_open(
     terminal_with: Start, second_terminal: Start
 ) -> None:
     terminal = terminal_with(PANEL)
@@ -23,7 +23,7 @@ def test_f12_is_tried_once_while_no_line_is_open(
     assert "First start" not in again.text()
 
 
-def test_a_key_that_no_terminal_is_known_to_send_is_reported(terminal_with: Start) -> None:
+def test_unknown_key_sequence_is_reported(terminal_with: Start) -> None:
     terminal = terminal_with(PANEL)
     terminal.wait_for("press F12")
     # as raw bytes: a sequence of nobody
@@ -31,7 +31,7 @@ def test_a_key_that_no_terminal_is_known_to_send_is_reported(terminal_with: Star
     terminal.wait_for("does not know", "ESC [999~")
 
 
-def test_with_a_line_f12_is_not_requested(terminal_with: Start) -> None:
+def test_f12_is_not_tested_with_an_open_line(terminal_with: Start) -> None:
     """It would stop motors that run."""
     terminal = terminal_with([*PANEL, "sim:atv71@2"])
     terminal.wait_for("ATV71", "1 found")

@@ -78,12 +78,12 @@ def ours(line: str, *codes: str) -> dict[str, int | None]:
     return {code: value["raw"] for code, value in json.loads(done.stdout)["values"].items()}
 
 
-def test_mbpoll_reads_what_the_drive_holds(reached: Reached) -> None:
+def test_mbpoll_reads_values_of_the_drive(reached: Reached) -> None:
     assert reached.mbpoll.words(STATUS, 2) == {STATUS: 0x0637, FREQUENCY: 425}
     assert reached.mbpoll.words(ACCELERATION) == {ACCELERATION: 57}
 
 
-def test_write_by_mbpoll_is_read_back_by_both(reached: Reached) -> None:
+def test_write_by_mbpoll_is_read_by_both(reached: Reached) -> None:
     assert reached.mbpoll.run(ACCELERATION, "61").returncode == 0
     assert reached.mbpoll.words(ACCELERATION) == {ACCELERATION: 61}
     assert ours(reached.line, "ACC", "ETA", "RFR") == {"ACC": 61, "ETA": 0x0637, "RFR": 425}
@@ -94,13 +94,13 @@ def test_mbpoll_writes_two_neighbors_at_once(reached: Reached) -> None:
     assert ours(reached.line, "ACC", "DEC") == {"ACC": 62, "DEC": 63}
 
 
-def test_mbpoll_is_refused_where_there_is_no_parameter(reached: Reached) -> None:
+def test_mbpoll_read_of_an_unknown_address_is_refused(reached: Reached) -> None:
     done = reached.mbpoll.run(1)
     assert done.returncode != 0
     assert "Illegal data address" in done.stdout + done.stderr
 
 
-def test_mbpoll_cannot_write_what_is_only_read(reached: Reached) -> None:
+def test_mbpoll_cannot_write_read_only_parameters(reached: Reached) -> None:
     done = reached.mbpoll.run(STATUS, "5")
     assert done.returncode != 0
     assert "failed" in done.stdout + done.stderr

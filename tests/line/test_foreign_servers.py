@@ -52,27 +52,27 @@ def expect_the_three_words(line: str) -> None:
     assert {item["quality"] for item in read["values"].values()} == {"good"}
 
 
-def test_libmodbus(libmodbus_line: str) -> None:
+def test_libmodbus_server_is_read(libmodbus_line: str) -> None:
     expect_the_three_words(libmodbus_line)
 
 
-def test_modbus_tk(tk_line: str) -> None:
+def test_modbus_tk_server_is_read(tk_line: str) -> None:
     expect_the_three_words(tk_line)
 
 
-def test_modbus_serial(node: str) -> None:
+def test_modbus_serial_server_is_read(node: str) -> None:
     command = [node, str(HERE / "serial_server.js"), str(free_port())]
     with served(command, ready="ready") as server:
         expect_the_three_words(f"tcp:127.0.0.1:{port_of(server.ready)}")
 
 
-def test_a_server_without_function_43_is_answered_with_what_to_type(libmodbus_line: str) -> None:
+def test_server_without_function_43_gets_advice_on_what_to_type(libmodbus_line: str) -> None:
     done = drivepanel("read", libmodbus_line, "ETA", "-d", "2", "--json")
     assert (done.returncode, json.loads(done.stdout)["status"]) == (2, 2)
     assert "-p" in done.stderr
 
 
-def test_an_address_that_nobody_has(tk_line: str) -> None:
+def test_unused_address_is_reported(tk_line: str) -> None:
     done = drivepanel("read", tk_line, "ETA", "-d", "9", "-p", "atv71", "--json")
     assert done.returncode in (3, 4), done.stderr  # over TCP a gateway may refuse in its name
     assert done.stderr.startswith("drivepanel: ")

@@ -42,9 +42,7 @@ def ways(sequence: str) -> Iterator[tuple[tuple[str, ...], float]]:
 
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("number", [9, 12])
-def test_the_stop_keys_of_every_terminal_stop_and_do_nothing_else(
-    panel: PtyPanel, dialect: str, number: int
-) -> None:
+def test_stop_keys_of_every_terminal_only_stop(panel: PtyPanel, dialect: str, number: int) -> None:
     for pieces, gap in ways(DIALECTS[dialect][number - 1]):
         before = len(panel.log.writes)
         panel.type(*pieces, apart=gap)
@@ -60,9 +58,7 @@ def test_the_stop_keys_of_every_terminal_stop_and_do_nothing_else(
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_the_other_function_keys_of_every_terminal_type_nothing(
-    panel: PtyPanel, dialect: str
-) -> None:
+def test_other_function_keys_of_every_terminal_type_nothing(panel: PtyPanel, dialect: str) -> None:
     before = len(panel.log.writes)
     for sequence in (DIALECTS[dialect][n - 1] for n in (2, 3, 4, 5, 6, 7, 8, 10, 11)):
         for cut in range(len(sequence)):
@@ -78,7 +74,7 @@ def test_the_other_function_keys_of_every_terminal_type_nothing(
     "typed", ["r ", "r\r ", "\x1b[A\x1b[Ar ", "ar ", "30\r\x1b[24~", "f30\r ", " r", "r \r"]
 )
 @pytest.mark.parametrize("armed", [True, False], ids=["armed", "unarmed"])
-def test_keys_and_a_stop_in_one_write_stop_and_do_nothing_else(
+def test_keys_written_together_with_a_stop_only_stop(
     panel: PtyPanel, typed: str, armed: bool
 ) -> None:
     if armed:
@@ -91,7 +87,7 @@ def test_keys_and_a_stop_in_one_write_stop_and_do_nothing_else(
 
 @pytest.mark.parametrize("armed", [True, False], ids=["armed", "unarmed"])
 @pytest.mark.parametrize("seed", range(3))
-def test_a_paste_without_brackets_only_stops(panel: PtyPanel, armed: bool, seed: int) -> None:
+def test_unbracketed_paste_only_stops(panel: PtyPanel, armed: bool, seed: int) -> None:
     if armed:
         panel.arm()
     chance = random.Random(seed)
@@ -104,7 +100,7 @@ def test_a_paste_without_brackets_only_stops(panel: PtyPanel, armed: bool, seed:
     panel.shows("Output", "a arm")
 
 
-def test_a_paste_with_brackets_does_nothing_at_all(panel: PtyPanel) -> None:
+def test_bracketed_paste_does_nothing(panel: PtyPanel) -> None:
     panel.arm()
     before = len(panel.log.writes)
     text = "\x1b[200~r  v\rq\x1b[201~"
@@ -115,12 +111,12 @@ def test_a_paste_with_brackets_does_nothing_at_all(panel: PtyPanel) -> None:
     panel.shows("Output", "a arm")
 
 
-def test_keys_that_were_not_taken_are_reported(fresh_panel: PtyPanel) -> None:
+def test_ignored_keys_are_reported(fresh_panel: PtyPanel) -> None:
     fresh_panel.type("bar")
     fresh_panel.shows("3 keys came together and were")
 
 
-def test_a_key_alone_runs_the_motor_and_arrows_at_once_are_one_step(fresh_panel: PtyPanel) -> None:
+def test_single_key_runs_the_motor_and_joined_arrows_are_one_step(fresh_panel: PtyPanel) -> None:
     panel = fresh_panel
     panel.run(30)
     before = len(panel.log.writes)
@@ -132,7 +128,7 @@ def test_a_key_alone_runs_the_motor_and_arrows_at_once_are_one_step(fresh_panel:
     wait_until(lambda: panel.look() and STOP in panel.log.writes[before:], "the stop")
 
 
-def test_a_paste_into_a_text_is_text_and_submits_nothing(fresh_panel: PtyPanel) -> None:
+def test_paste_into_a_field_is_text_and_submits_nothing(fresh_panel: PtyPanel) -> None:
     panel = fresh_panel
     panel.type("3")
     panel.shows("/ search")
@@ -147,7 +143,7 @@ def test_a_paste_into_a_text_is_text_and_submits_nothing(fresh_panel: PtyPanel) 
 
 
 @pytest.mark.parametrize("options", [(), ("--mouse",)], ids=["without mouse", "with mouse"])
-def test_a_terminal_is_requested_its_mouse_only_with_the_option(options: tuple[str, ...]) -> None:
+def test_mouse_is_requested_only_with_the_option(options: tuple[str, ...]) -> None:
     with panel_on_a_pty(*options) as panel:
         panel.type("q")
         wait_until(lambda: not panel.look(), "the panel ends")

@@ -32,7 +32,7 @@ def panel_on(start: Start, line: str) -> Terminal:
         ("lost", 0.2, "% good", "replies were good in the last minute"),
     ],
 )
-def test_a_trouble_of_the_line_is_shown_on_every_screen(
+def test_line_trouble_is_shown_on_every_screen(
     terminal_with: Start, kind: str, value: float, sign: str, meaning: str
 ) -> None:
     rates, habits = troubles_of({kind: value})
@@ -46,7 +46,7 @@ def test_a_trouble_of_the_line_is_shown_on_every_screen(
         panel.wait_for("1 Line ▲")
 
 
-def test_a_healthy_line_with_two_programs_raises_no_alert(terminal_with: Start) -> None:
+def test_healthy_line_with_two_programs_raises_no_alert(terminal_with: Start) -> None:
     with bench(DriveSpec("atv71", 1), DriveSpec("atv312", 2)) as (_, line):
         panel = panel_on(terminal_with, line)
         panel.wait_for("STANDBY")

@@ -29,7 +29,7 @@ def programs() -> Iterator[ExitStack]:
         yield stack
 
 
-def test_a_keeper_that_was_frozen_ends_itself_when_it_goes_on() -> None:
+def test_resumed_frozen_keeper_exits() -> None:
     with bench() as (_, line):
         # also where the program that starts it ignores the alarm
         ignoring = ("sh", "-c", "trap '' ALRM; exec \"$@\"", "sh", *DRIVEPANEL)
@@ -62,7 +62,7 @@ def gateway(programs: ExitStack) -> tuple[Simulation, str]:
     return simulation, programs.enter_context(one_connection(simulation.serve_tcp(), "wait"))
 
 
-def test_a_stop_replaces_a_keeper_that_is_frozen(programs: ExitStack) -> None:
+def test_stop_replaces_a_frozen_keeper(programs: ExitStack) -> None:
     simulation, line = gateway(programs)
     with frozen_keeper(programs, line) as (frozen, runner, recorder):
         status, errors = runner.end(signal.SIGINT)
@@ -73,7 +73,7 @@ def test_a_stop_replaces_a_keeper_that_is_frozen(programs: ExitStack) -> None:
         times_of_good_values(recorder, 1.0)
 
 
-def test_a_keeper_that_is_frozen_is_replaced_without_a_stop(programs: ExitStack) -> None:
+def test_frozen_keeper_is_replaced_without_a_stop(programs: ExitStack) -> None:
     simulation, line = gateway(programs)
     with frozen_keeper(programs, line) as (frozen, runner, recorder):
         wait_until(lambda: not is_running(frozen), "it is killed")
@@ -83,7 +83,7 @@ def test_a_keeper_that_is_frozen_is_replaced_without_a_stop(programs: ExitStack)
         assert runner.process.poll() is None
 
 
-def test_a_program_that_was_frozen_itself_kills_no_keeper(programs: ExitStack) -> None:
+def test_program_that_was_frozen_kills_no_keeper(programs: ExitStack) -> None:
     with bench() as (_, line):
         recorder = programs.enter_context(served(records(line), ready="{"))
         pid = keeper()
@@ -96,7 +96,7 @@ def test_a_program_that_was_frozen_itself_kills_no_keeper(programs: ExitStack) -
 
 
 @pytest.mark.usefixtures("with_keepers")
-def test_a_keeper_that_is_well_is_kept_after_stops() -> None:
+def test_healthy_keeper_is_kept_after_stops() -> None:
     with bench() as (_, line):
         opened = open_line(line, wait=PATIENCE, program="panel")
         try:

@@ -138,7 +138,7 @@ def far(ssh_host: SshHost, terminal_with: Start, tmp_path: Path, peer: Peer) -> 
 
 
 @pytest.mark.parametrize("key", ["r", "Up", "Enter"])
-def test_a_stop_behind_earlier_keys_is_the_last_word_on_a_running_motor(far: Far, key: str) -> None:
+def test_stop_after_earlier_keys_stops_a_running_motor(far: Far, key: str) -> None:
     far.run()
     before = len(far.log.writes)
     far.type_while_hung((1.0, key), (2.5, "Space"))
@@ -149,7 +149,7 @@ def test_a_stop_behind_earlier_keys_is_the_last_word_on_a_running_motor(far: Far
     assert far.moved(before) == []
 
 
-def test_a_line_that_is_open_when_the_link_hangs_runs_nothing_behind_a_stop(far: Far) -> None:
+def test_open_run_line_on_a_hung_link_runs_nothing_after_a_stop(far: Far) -> None:
     far.terminal.press("a")
     wait_until(lambda: far.armed, "armed")
     far.terminal.press("r")
@@ -161,7 +161,7 @@ def test_a_line_that_is_open_when_the_link_hangs_runs_nothing_behind_a_stop(far:
     assert far.moved(0) == []
 
 
-def test_keys_far_apart_that_a_link_lets_through_at_once_are_a_message(far: Far) -> None:
+def test_spaced_keys_delivered_together_are_ignored_and_reported(far: Far) -> None:
     far.type_while_hung((0.0, "a"), (1.5, "r"), (3.0, "r"), (4.5, "v"))
     far.terminal.wait_for("4 keys came together and were")
     time.sleep(1.0)

@@ -82,7 +82,7 @@ def times_of_good_values(recorder: Served, seconds: float) -> list[float]:
     return found
 
 
-def test_it_inherits_nothing_and_outlives_its_command() -> None:
+def test_keeper_inherits_nothing_and_outlives_its_command() -> None:
     with bench() as (_, line):
         # the command substitution of a shell waits for whoever has its output open
         assert read(line).returncode == 0
@@ -94,7 +94,7 @@ def test_it_inherits_nothing_and_outlives_its_command() -> None:
         assert b"-P\0-m\0tui.keeper\0" in (process / "cmdline").read_bytes()
 
 
-def test_the_port_is_free_when_the_last_program_has_ended() -> None:
+def test_port_is_free_after_the_last_program_has_exited() -> None:
     with bench() as (_, line):
         port = line.removeprefix("serial:").partition(",")[0]
         assert read(line).returncode == 0
@@ -121,7 +121,7 @@ def test_another_program_opens_the_port_between_two_commands() -> None:
         assert alone.returncode == 0, alone.stderr
 
 
-def test_other_settings_of_the_line_need_no_wait() -> None:
+def test_other_line_settings_need_no_wait() -> None:
     with Simulation([DriveSpec("atv71", 1)]) as simulation:
         path = simulation.serve_pty()
         assert read(f"serial:{path},9600,8N1").returncode == 3
@@ -130,14 +130,14 @@ def test_other_settings_of_the_line_need_no_wait() -> None:
         assert keeper() != before
 
 
-def test_a_port_that_is_not_there_is_reported_at_once() -> None:
+def test_missing_port_is_reported_immediately() -> None:
     done = read("serial:/dev/ttyNONE0")
     assert done.returncode == 3
     assert "/dev/ttyNONE0 does not exist." in done.stderr
     assert "was not connected within" not in done.stderr
 
 
-def test_a_port_that_is_in_use_is_reported_with_its_holder() -> None:
+def test_port_in_use_is_reported_with_its_holder() -> None:
     with bench() as (_, line):
         path = line.removeprefix("serial:").partition(",")[0]
         with served([*DRIVEPANEL, "watch", line, "ETA", "-d", "1", "-p", "atv71"], ready="ETA"):
@@ -153,7 +153,7 @@ def test_a_port_that_is_in_use_is_reported_with_its_holder() -> None:
         assert "in use by drivepanel, the keeper of the line (pid" in other.stderr
 
 
-def test_one_that_serves_nobody_makes_way_for_a_listener() -> None:
+def test_idle_keeper_exits_for_a_monitor() -> None:
     with bench() as (_, line):
         assert read(line).returncode == 0
         pid = keeper()
@@ -163,7 +163,7 @@ def test_one_that_serves_nobody_makes_way_for_a_listener() -> None:
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
-def test_the_motor_runs_on_when_the_keeper_ends_and_its_program_lives(
+def test_motor_runs_on_if_the_keeper_exits_but_not_its_program(
     programs: ExitStack, number: signal.Signals
 ) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, recorder):
@@ -180,7 +180,7 @@ def test_the_motor_runs_on_when_the_keeper_ends_and_its_program_lives(
         assert runner.process.wait(PATIENCE) == 6
 
 
-def test_the_motor_stops_when_its_program_dies_with_the_keeper(programs: ExitStack) -> None:
+def test_motor_stops_if_its_program_dies_with_the_keeper(programs: ExitStack) -> None:
     with motor_run(programs, "watch") as (simulation, _, runner, recorder):
         os.kill(keeper(), signal.SIGSTOP)
         runner.process.kill()
@@ -192,7 +192,7 @@ def test_the_motor_stops_when_its_program_dies_with_the_keeper(programs: ExitSta
 
 
 @pytest.mark.parametrize("others_live", [True, False])
-def test_stop_on_a_line_whose_keeper_is_frozen_is_sent_by_the_next(
+def test_stop_to_a_frozen_keeper_is_sent_by_the_next(
     programs: ExitStack, others_live: bool
 ) -> None:
     with motor_run(programs, "watch") as (simulation, line, runner, recorder):
@@ -207,7 +207,7 @@ def test_stop_on_a_line_whose_keeper_is_frozen_is_sent_by_the_next(
         assert not is_running(frozen)
 
 
-def test_after_three_deaths_the_programs_hold_the_line_themselves(programs: ExitStack) -> None:
+def test_programs_hold_the_line_after_three_keeper_deaths(programs: ExitStack) -> None:
     with motor_run(programs, "watch") as (simulation, _, _, recorder):
         for _ in range(3):
             wait_until(lambda: len(keepers()) == 1, "a keeper is there")
@@ -218,7 +218,7 @@ def test_after_three_deaths_the_programs_hold_the_line_themselves(programs: Exit
         assert turns(simulation)
 
 
-def test_a_program_without_a_keeper_says_so(
+def test_program_without_a_keeper_reports_it(
     terminal_with: Callable[[list[str]], Terminal],
 ) -> None:
     with bench() as (_, line):
@@ -234,7 +234,7 @@ def test_a_program_without_a_keeper_says_so(
         assert keepers() == []
 
 
-def test_a_program_that_died_before_the_keeper_is_not_forgotten(
+def test_program_that_died_before_the_keeper_is_still_reported(
     programs: ExitStack, terminal_with: Callable[[list[str]], Terminal]
 ) -> None:
     """A person at the other panel has time to take the motor over; then the keeper dies, too."""
@@ -247,7 +247,7 @@ def test_a_program_that_died_before_the_keeper_is_not_forgotten(
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
 
 
-def test_a_motor_is_stopped_when_its_lost_line_is_back(tmp_path: Path) -> None:
+def test_motor_is_stopped_when_its_lost_line_returns(tmp_path: Path) -> None:
     with Simulation([DriveSpec("atv71", 1, sets={"SLL": 0})]) as simulation:
         line = f"serial:{simulation.serve_pty(str(tmp_path / 'line'))},19200,8N1"
         with served(runs_a_motor(line), ready="running forward") as runner:
@@ -259,7 +259,7 @@ def test_a_motor_is_stopped_when_its_lost_line_is_back(tmp_path: Path) -> None:
             wait_until(lambda: stands(simulation), "the motor stops")
 
 
-def test_programs_hold_the_line_themselves_where_no_keeper_can_listen(
+def test_programs_hold_the_line_if_no_keeper_can_listen(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("XDG_RUNTIME_DIR", str(tmp_path / "file"))
@@ -272,7 +272,7 @@ def test_programs_hold_the_line_themselves_where_no_keeper_can_listen(
         wait_until(lambda: keepers() == [], "no keeper stays")
 
 
-def test_paths_from_the_folder_of_the_program_hold_for_its_keeper(
+def test_keeper_resolves_paths_relative_to_the_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -287,7 +287,7 @@ def test_paths_from_the_folder_of_the_program_hold_for_its_keeper(
 
 
 @pytest.mark.usefixtures("with_keepers")
-def test_the_port_is_free_as_soon_as_a_line_is_closed() -> None:
+def test_port_is_free_once_a_line_is_closed() -> None:
     with bench() as (_, line):
         for _ in range(5):
             opened = open_line(line, wait=PATIENCE, program="panel")
@@ -309,7 +309,7 @@ with open_drives(sys.argv[1]) as line:
 """
 
 
-def test_the_line_of_a_script_is_held_by_a_keeper(programs: ExitStack) -> None:
+def test_line_of_a_script_is_held_by_a_keeper(programs: ExitStack) -> None:
     with bench() as (_, line):
         script = [sys.executable, "-c", SCRIPT, line]
         started = served(script, ready="\n", stdin=subprocess.PIPE)
@@ -322,7 +322,7 @@ def test_the_line_of_a_script_is_held_by_a_keeper(programs: ExitStack) -> None:
 
 
 @pytest.mark.parametrize("executable", ["/usr/bin/qgis", "", None])
-def test_no_keeper_is_started_by_a_program_that_embeds_python(
+def test_embedded_python_starts_no_keeper(
     monkeypatch: pytest.MonkeyPatch, executable: str | None
 ) -> None:
     assert can_start()
@@ -330,7 +330,7 @@ def test_no_keeper_is_started_by_a_program_that_embeds_python(
     assert not can_start()
 
 
-def test_the_next_program_has_the_trend_of_one_that_was_killed() -> None:
+def test_next_program_gets_the_trend_of_a_killed_one() -> None:
     with bench() as (_, line):
         command = [*DRIVEPANEL, "watch", line, "-d", "1", "-p", "atv71", "--every", "0.2", "--json"]
         with served(command) as recorder:
@@ -349,7 +349,7 @@ def test_the_next_program_has_the_trend_of_one_that_was_killed() -> None:
 
 
 @pytest.mark.usefixtures("with_keepers")
-def test_the_next_keeper_polls_for_the_programs_of_a_killed_one() -> None:
+def test_next_keeper_polls_for_programs_of_a_killed_keeper() -> None:
     with bench() as (_, line):
         opened = open_line(line, wait=PATIENCE, program="panel")
         try:
@@ -392,7 +392,7 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 
 @pytest.mark.parametrize("gives", ["stop", "nothing"])
-def test_a_stop_is_carried_out_whose_program_ends_before_its_word(gives: str) -> None:
+def test_stop_is_carried_out_if_its_program_exits_before_the_write(gives: str) -> None:
     with Simulation([DriveSpec("atv71", 1, run_hz=30.0, sets={"SLL": 0})]) as simulation:
         line = f"serial:{simulation.serve_pty()},19200,8N1"
         subprocess.run([sys.executable, "-c", DIES, line, gives], check=False, timeout=PATIENCE)

@@ -33,7 +33,7 @@ def tripped(simulation: Simulation) -> bool:
 
 
 @pytest.mark.usefixtures("with_keepers")
-def test_drive_does_not_trip_while_the_loop_of_its_program_is_busy() -> None:
+def test_drive_does_not_trip_while_its_program_is_busy() -> None:
     with bench(STRICT) as (simulation, line):
         with open_drives(line) as drives:
             drives.drive(profile="atv71")
@@ -94,7 +94,7 @@ def test_motor_of_a_program_whose_loop_hangs_is_stopped() -> None:
 
 
 @pytest.mark.usefixtures("with_keepers")
-def test_drive_that_was_left_running_on_purpose_is_not_kept_alive() -> None:
+def test_drive_left_running_on_purpose_is_not_kept_alive() -> None:
     with bench(STRICT) as (simulation, line), closing(open_line(line, program="panel")):
         with served(runs_a_motor(line, "--leave-running"), ready="running forward") as runner:
             wait_until(lambda: turns(simulation), "the motor turns")

@@ -24,7 +24,7 @@ def at_rest(panel: PtyPanel) -> None:
 
 @pytest.mark.parametrize("typed", ["\r ", " \r", f"30\r{F12}", "5 ", "\x1b[A ", f"\r{F9}\r", "r "])
 @pytest.mark.parametrize("key", ["r", "v", "f"])
-def test_a_stop_in_a_piece_closes_the_open_line(panel: PtyPanel, key: str, typed: str) -> None:
+def test_stop_in_a_burst_closes_the_open_run_line(panel: PtyPanel, key: str, typed: str) -> None:
     panel.open_line(key)
     before = len(panel.log.writes)
     panel.type(typed)
@@ -33,7 +33,7 @@ def test_a_stop_in_a_piece_closes_the_open_line(panel: PtyPanel, key: str, typed
 
 
 @pytest.mark.parametrize("stop", [" ", F12, F9])
-def test_enter_behind_a_stop_runs_nothing(panel: PtyPanel, stop: str) -> None:
+def test_enter_after_a_stop_runs_nothing(panel: PtyPanel, stop: str) -> None:
     panel.open_line()
     before = len(panel.log.writes)
     panel.type(stop)
@@ -43,7 +43,7 @@ def test_enter_behind_a_stop_runs_nothing(panel: PtyPanel, stop: str) -> None:
 
 
 @pytest.mark.parametrize("key", ["k", "e"])
-def test_the_other_stops_are_not_swallowed_by_the_open_line(panel: PtyPanel, key: str) -> None:
+def test_other_stop_keys_work_with_an_open_run_line(panel: PtyPanel, key: str) -> None:
     panel.run()
     panel.open_line("f")
     before = len(panel.log.writes)
@@ -56,7 +56,7 @@ def test_the_other_stops_are_not_swallowed_by_the_open_line(panel: PtyPanel, key
 
 
 @pytest.mark.parametrize("typed", ["\r", "30\r", "r30\r", "ar30\r"])
-def test_no_run_comes_of_a_piece(panel: PtyPanel, typed: str) -> None:
+def test_burst_does_not_run_the_motor(panel: PtyPanel, typed: str) -> None:
     panel.open_line()
     before = len(panel.log.writes)
     panel.type(f"5{typed}")
@@ -69,7 +69,7 @@ def test_no_run_comes_of_a_piece(panel: PtyPanel, typed: str) -> None:
 @pytest.mark.parametrize(
     "typed", ["r ", "r\r ", "\x1b[A\x1b[Ar ", "ar ", f"30\r{F12}", f"f40\r{F9}"]
 )
-def test_keys_that_a_hung_link_kept_only_stop_a_running_motor(panel: PtyPanel, typed: str) -> None:
+def test_keys_delayed_by_a_hung_link_only_stop(panel: PtyPanel, typed: str) -> None:
     panel.run()
     before = len(panel.log.writes)
     panel.type(typed)
@@ -77,7 +77,7 @@ def test_keys_that_a_hung_link_kept_only_stop_a_running_motor(panel: PtyPanel, t
     at_rest(panel)
 
 
-def test_keys_before_a_stop_in_the_next_read_do_nothing_behind_it(panel: PtyPanel) -> None:
+def test_keys_read_before_a_stop_do_nothing_after_it(panel: PtyPanel) -> None:
     for key in ("r", "\x1b[A", "x", "o", "T", "v"):
         panel.arm()
         before = len(panel.log.writes)
@@ -90,9 +90,7 @@ PASTES = ["bar", "cd /var/run && ./fork.sh --verbose 30 a r\r", "r30\r", "arf30\
 
 @pytest.mark.parametrize("armed", [True, False], ids=["armed", "unarmed"])
 @pytest.mark.parametrize("text", PASTES)
-def test_a_paste_without_brackets_that_is_cut_anywhere_only_stops(
-    panel: PtyPanel, text: str, armed: bool
-) -> None:
+def test_unbracketed_paste_cut_anywhere_only_stops(panel: PtyPanel, text: str, armed: bool) -> None:
     chance = random.Random(text)
     cuts = sorted(chance.sample(range(1, len(text)), min(6, len(text) - 1)))
     for cut in cuts:
@@ -108,7 +106,7 @@ def test_a_paste_without_brackets_that_is_cut_anywhere_only_stops(
 
 
 @pytest.mark.parametrize("armed", [True, False], ids=["armed", "unarmed"])
-def test_random_keys_at_once_that_are_cut_anywhere_only_stop(panel: PtyPanel, armed: bool) -> None:
+def test_random_burst_cut_anywhere_only_stops(panel: PtyPanel, armed: bool) -> None:
     chance = random.Random(armed)
     for _ in range(4):
         if armed:
@@ -131,7 +129,7 @@ def leave_questions(panel: PtyPanel) -> None:
     panel.shows("Output", "Current")
 
 
-def test_keys_two_seconds_apart_on_a_link_that_hangs_are_a_message(panel: PtyPanel) -> None:
+def test_spaced_keys_on_a_hung_link_are_ignored_and_reported(panel: PtyPanel) -> None:
     before = len(panel.log.writes)
     panel.type("arrv")  # typed 2 s apart, let through at once
     panel.shows("4 keys came together and were")
@@ -171,7 +169,7 @@ def test_only_y_writes_a_parameter(fresh_panel: PtyPanel, key: str) -> None:
     panel.stops(before)
 
 
-def test_y_alone_writes_a_parameter(fresh_panel: PtyPanel) -> None:
+def test_single_y_writes_a_parameter(fresh_panel: PtyPanel) -> None:
     panel = fresh_panel
     stage_a_ramp(panel)
     panel.arm()
@@ -184,7 +182,7 @@ def test_y_alone_writes_a_parameter(fresh_panel: PtyPanel) -> None:
 
 
 @pytest.mark.parametrize("key", ["q", "n", "\x1b", "\r", " "])
-def test_only_y_recalls_the_factory_settings(fresh_panel: PtyPanel, key: str) -> None:
+def test_only_y_restores_factory_settings(fresh_panel: PtyPanel, key: str) -> None:
     panel = fresh_panel
     panel.type("3")
     panel.shows("/ search")
@@ -227,7 +225,7 @@ def test_space_stops_while_a_number_is_typed(fresh_panel: PtyPanel) -> None:
     ("pieces", "apart"),
     [(("\x1b ",), 0.0), (("\x1b", " "), 0.02), (("AC\r ",), 0.0), (("AC\t", " "), 0.02)],
 )
-def test_space_behind_a_key_that_leaves_a_text_stops(
+def test_space_after_a_key_that_leaves_a_field_stops(
     fresh_panel: PtyPanel, pieces: tuple[str, ...], apart: float
 ) -> None:
     panel = fresh_panel
@@ -263,7 +261,7 @@ def test_space_stops_in_a_search(fresh_panel: PtyPanel) -> None:
     at_rest(panel)
 
 
-def test_space_is_text_in_a_text(fresh_panel: PtyPanel) -> None:
+def test_space_is_text_in_a_field(fresh_panel: PtyPanel) -> None:
     panel = fresh_panel
     name_of_file(panel)
     panel.type("of a")
@@ -276,7 +274,7 @@ def test_space_is_text_in_a_text(fresh_panel: PtyPanel) -> None:
     assert panel.log.writes == []
 
 
-def test_bursts_with_a_stop_run_nothing_behind_it(fresh_panel: PtyPanel) -> None:
+def test_bursts_with_a_stop_run_nothing_after_it(fresh_panel: PtyPanel) -> None:
     counted = Counted()
     bursts(fresh_panel, random.Random(7), 60, counted)
     assert (counted.pieces, counted.stopless) == (60, 0)
@@ -285,7 +283,7 @@ def test_bursts_with_a_stop_run_nothing_behind_it(fresh_panel: PtyPanel) -> None
     assert moved == (0, 0, 0)
 
 
-def test_random_keys_write_nothing_unarmed(fresh_panel: PtyPanel) -> None:
+def test_random_keys_write_nothing_while_disarmed(fresh_panel: PtyPanel) -> None:
     counted = Counted()
     unarmed(fresh_panel, random.Random(8), 1000, counted, MIXED)
     assert counted.keys == 1000

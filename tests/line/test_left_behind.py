@@ -36,7 +36,7 @@ def frames(simulation: Simulation) -> int:
 
 
 @INSIDE
-def test_the_next_panel_knows_the_motor_and_takes_it_over(
+def test_next_panel_reports_the_motor_and_takes_it_over(
     terminal_with: Start, second_terminal: Start
 ) -> None:
     with running(terminal_with) as made:
@@ -63,9 +63,7 @@ def test_the_next_panel_knows_the_motor_and_takes_it_over(
 
 
 @INSIDE
-def test_a_motor_that_is_disowned_is_not_left_without_a_question(
-    terminal_with: Start, second_terminal: Start
-) -> None:
+def test_leaving_a_disowned_motor_asks_first(terminal_with: Start, second_terminal: Start) -> None:
     """Its polls feed the drive's timeout: one q alone would let the motor coast later."""
     with running(terminal_with) as made:
         os.kill(made.pid, signal.SIGKILL)
@@ -80,7 +78,7 @@ def test_a_motor_that_is_disowned_is_not_left_without_a_question(
 
 
 @INSIDE
-def test_a_stop_that_was_seen_withdraws_the_offer(
+def test_observed_standstill_withdraws_the_offer(
     terminal_with: Start, second_terminal: Start
 ) -> None:
     with running(terminal_with) as made:
@@ -97,7 +95,7 @@ def test_a_stop_that_was_seen_withdraws_the_offer(
 
 
 @pytest.mark.usefixtures("holder")
-def test_a_motor_left_running_on_purpose_is_reported(
+def test_motor_left_running_on_purpose_is_reported(
     terminal_with: Start, second_terminal: Start
 ) -> None:
     with running(terminal_with) as made:
@@ -194,7 +192,7 @@ def test_commands_show_a_motor_that_no_program_commands(killed: Killed) -> None:
     assert documents("status", line, "-d", "1")["left_behind"] is None
 
 
-def test_commands_forget_a_motor_that_the_drive_itself_has_stopped(killed: Killed) -> None:
+def test_commands_drop_a_motor_that_its_drive_has_stopped(killed: Killed) -> None:
     assert documents("lines")["left_behind"] != []
     killed.simulation.drive(1).set("TTO", 10)
     wait_until(lambda: killed.simulation.drive(1).fault is not None, "the drive's own timeout")

@@ -57,7 +57,7 @@ def tapped_cable(drives: str) -> Iterator[tuple[str, str]]:
             os.close(handle)
 
 
-def test_mbpoll_as_the_master(peer: Peer, tmp_path: Path) -> None:
+def test_mbpoll_traffic_is_monitored(peer: Peer, tmp_path: Path) -> None:
     """What mbpoll reads and writes is told, and is in the file as tshark reads it."""
     mbpoll, tshark = peer("mbpoll", "mbpoll"), peer("tshark", "tshark")
     file = tmp_path / "frames.pcapng"
@@ -103,7 +103,7 @@ def test_mbpoll_as_the_master(peer: Peer, tmp_path: Path) -> None:
     }  # fmt: skip
 
 
-def test_no_write_no_break_no_drain_reaches_the_port(peer: Peer, tmp_path: Path) -> None:
+def test_monitoring_sends_nothing_to_the_port(peer: Peer, tmp_path: Path) -> None:
     """By strace: the port is opened for reading, set up, locked and read; nothing else."""
     strace = peer("strace", "strace")
     log = tmp_path / "calls"

@@ -16,7 +16,7 @@ def pump(line: str) -> None:
 
 
 @pytest.mark.parametrize("words", [("pump",), ()], ids=["named", "left out"])
-def test_the_panel_opens_on_the_drive_of_a_name(words: tuple[str, ...]) -> None:
+def test_panel_opens_on_the_drive_of_a_name(words: tuple[str, ...]) -> None:
     def named(line: str) -> tuple[str, ...]:
         pump(line)
         return words

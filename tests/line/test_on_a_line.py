@@ -67,7 +67,7 @@ async def until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
         ("atv71", "Telemecanique", "ATV71", "MACHINE 4"),
     ],
 )
-async def test_identify(
+async def test_drives_of_every_family_are_identified(
     five: OpenLine, profile: str, vendor: str, reference: str, name: str
 ) -> None:
     found = await identify_drive(five.line, ADDRESSES[profile])
@@ -76,19 +76,19 @@ async def test_identify(
     assert found.version_text == "2.1"
 
 
-async def test_a_drive_without_function_43_is_found_by_its_status_word(five: OpenLine) -> None:
+async def test_drive_without_function_43_is_found_by_its_status_word(five: OpenLine) -> None:
     found = await identify_drive(five.line, ADDRESSES["powerdrive"])
     assert found.profile is None
     assert set(found.candidates) == {"powerdrive", "proxidrive", "varmeca"}
 
 
-async def test_nobody_there(five: OpenLine) -> None:
+async def test_unused_address_gives_no_answer(five: OpenLine) -> None:
     with pytest.raises(NoAnswer):
         await identify_drive(five.line, 99)
 
 
 @pytest.mark.parametrize("profile", DRIVES)
-async def test_the_monitor_tells_what_the_motor_does(five: OpenLine, profile: str) -> None:
+async def test_monitor_shows_the_motor_state(five: OpenLine, profile: str) -> None:
     drive = session(five, profile)
     monitor = Monitor(drive)
     monitor.start(period=0.1)
@@ -113,7 +113,7 @@ async def test_the_monitor_tells_what_the_motor_does(five: OpenLine, profile: st
     assert not monitor.running
 
 
-async def test_a_lost_line_makes_values_old_and_comes_back(five: OpenLine) -> None:
+async def test_lost_line_makes_values_stale_until_it_recovers(five: OpenLine) -> None:
     drive = session(five, "atv71")
     monitor = Monitor(drive)
     monitor.start(period=0.1)
@@ -141,7 +141,7 @@ async def test_a_lost_line_makes_values_old_and_comes_back(five: OpenLine) -> No
     monitor.stop()
 
 
-async def test_polling_goes_on_while_the_screen_stands_still(five: OpenLine) -> None:
+async def test_polling_continues_while_the_screen_is_frozen(five: OpenLine) -> None:
     drive = session(five, "atv71")
     monitor = Monitor(drive)
     monitor.start(period=0.1)
@@ -153,7 +153,7 @@ async def test_polling_goes_on_while_the_screen_stands_still(five: OpenLine) -> 
     monitor.stop()
 
 
-async def test_listeners_hear_every_cycle_until_they_leave(five: OpenLine) -> None:
+async def test_subscribers_get_every_cycle_until_they_unsubscribe(five: OpenLine) -> None:
     drive = session(five, "atv312")
     monitor = Monitor(drive)
     heard: list[Snapshot] = []
@@ -167,7 +167,7 @@ async def test_listeners_hear_every_cycle_until_they_leave(five: OpenLine) -> No
     monitor.stop()
 
 
-async def test_a_drive_left_alone_trips_and_a_kept_one_does_not() -> None:
+async def test_unpolled_drive_trips_and_a_polled_one_does_not() -> None:
     """The Altivar 21 watches the line from the first request on, for 3 s."""
     alone, kept = demo_line({"atv21": 35.0}), demo_line({"atv21": 35.0})
     line_watch = LineWatch(kept.line)
@@ -188,7 +188,7 @@ async def test_a_drive_left_alone_trips_and_a_kept_one_does_not() -> None:
         kept.close()
 
 
-async def test_a_drive_watched_from_the_start_is_judged_by_its_monitor() -> None:
+async def test_monitored_drive_uses_its_monitor_for_the_timeout() -> None:
     """The line watch learns the timeout though a monitor is at work, and takes its newer state."""
     opened = demo_line({"atv21": 35.0})
     drive = session(opened, "atv21")
@@ -213,7 +213,7 @@ async def test_a_drive_watched_from_the_start_is_judged_by_its_monitor() -> None
         opened.close()
 
 
-async def test_a_drive_is_fed_whatever_else_the_line_does() -> None:
+async def test_drive_is_kept_alive_under_any_load() -> None:
     """A flood of polls and of operator's reads leaves the line watch its place before them."""
     opened = demo_line({"atv21": 35.0, "atv71": 50.0})
     line_watch = LineWatch(opened.line)
@@ -271,7 +271,7 @@ async def test_drive_without_keep_alive_is_reported_before_it_trips(tmp_path: Pa
         opened.close()
 
 
-async def test_a_watch_that_begins_with_a_command_is_not_reported_before() -> None:
+async def test_timeout_that_starts_with_a_command_is_not_reported_before() -> None:
     opened = demo_line({"atv71": 0.0})
     line_watch = LineWatch(opened.line)
     drive = DriveSession(opened.line, 1, library.load("atv71"))
@@ -287,7 +287,7 @@ async def test_a_watch_that_begins_with_a_command_is_not_reported_before() -> No
         opened.close()
 
 
-async def test_an_overloaded_line_lowers_all_rates_evenly(
+async def test_overloaded_line_lowers_all_rates_evenly(
     five: OpenLine, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monitors = [Monitor(session(five, profile)) for profile in DRIVES]
@@ -309,7 +309,7 @@ async def test_an_overloaded_line_lowers_all_rates_evenly(
     [("atv31", 3102, 30), ("atv71", 3102, 64), ("atv21", 0xFD00, 2), ("atv21", 0x1876, 2),
      ("atv21", 0x1875, 6), ("powerdrive", 1000, 21)],
 )  # fmt: skip
-async def test_no_caller_gets_past_the_limits_of_a_profile(
+async def test_no_caller_exceeds_the_limits_of_a_profile(
     five: OpenLine, profile: str, address: int, count: int
 ) -> None:
     drive = session(five, profile)
@@ -319,13 +319,13 @@ async def test_no_caller_gets_past_the_limits_of_a_profile(
     assert five.line.counters.requests == before
 
 
-async def test_the_indirect_block_is_a_read_the_limits_allow(five: OpenLine) -> None:
+async def test_limits_allow_reading_the_indirect_block(five: OpenLine) -> None:
     drive = session(five, "atv21")
     reply = await five.line.read(drive.device, 0x1875, 5)
     assert len(reply.words) == 5
 
 
-async def test_silence_at_an_unconfirmed_word_is_no_dead_drive() -> None:
+async def test_silence_at_an_unconfirmed_word_is_not_a_dead_drive() -> None:
     from tui.simulator import DriveSpec, Simulation
 
     simulation = Simulation([DriveSpec("powerdrive", 1, protects=frozenset({"5.01"}))])
@@ -339,7 +339,7 @@ async def test_silence_at_an_unconfirmed_word_is_no_dead_drive() -> None:
         opened.close()
 
 
-def test_lines_that_are_none() -> None:
+def test_invalid_lines_are_refused() -> None:
     for text in ("modbus", "tcp:", "rtu-tcp:host", "sim:", "sim:nothing@1,"):
         with pytest.raises(LinkSyntaxError):
             check_line(text)
@@ -348,12 +348,12 @@ def test_lines_that_are_none() -> None:
 @pytest.mark.parametrize(
     ("text", "addresses"), [("1-3", [1, 2, 3]), ("5,1,5", [5, 1]), (" 2 - 3 , 9", [2, 3, 9])]
 )
-def test_addresses(text: str, addresses: list[int]) -> None:
+def test_address_ranges_are_parsed(text: str, addresses: list[int]) -> None:
     assert parse_addresses(text) == addresses
 
 
 @pytest.mark.parametrize("text", ["", "0", "248", "3-1", "a", "1-", "1,,2"])
-def test_addresses_that_are_none(text: str) -> None:
+def test_invalid_addresses_are_refused(text: str) -> None:
     with pytest.raises(LinkSyntaxError):
         parse_addresses(text)
 
@@ -370,7 +370,7 @@ def test_recent_lines_survive_a_damaged_file() -> None:
     assert recent_lines() == ["tcp:three:502"]
 
 
-async def test_a_closed_line_ends_its_thread() -> None:
+async def test_closed_line_ends_its_thread() -> None:
     opened = demo_line({"atv71": 10.0})
     line = opened.line
     opened.close()

@@ -84,12 +84,12 @@ def bench(request: pytest.FixtureRequest, awkward_drive: Path) -> Iterator[Bench
             yield Bench(kind, f"serial:{near}", server)
 
 
-def test_both_files_are_right() -> None:
+def test_own_profiles_are_valid() -> None:
     for kind in KINDS:
         assert library.faults_of(HERE / "profiles" / f"{kind.profile}.toml") == []
 
 
-def test_it_is_found_and_watched(bench: Bench) -> None:
+def test_own_drive_is_found_and_monitored(bench: Bench) -> None:
     refused = drivepanel("status", f"{bench.line},9600,8N1", "-d", "3")
     assert refused.returncode == 2
     assert f"name its profile with -p: {bench.kind.profile}" in refused.stderr
@@ -103,7 +103,7 @@ def test_it_is_found_and_watched(bench: Bench) -> None:
         assert bench.values("TEMP") == {"TEMP": 41.7}
 
 
-def test_it_runs_trips_and_is_reset(bench: Bench) -> None:
+def test_own_drive_runs_trips_and_is_reset(bench: Bench) -> None:
     for more, way in (([], "forward"), (["--reverse"], "reverse")):
         wish = ["--arm", "--reference", "25Hz", "--for", "0.5", "--leave-running", *more]
         bench.done("run", *wish)
@@ -133,7 +133,7 @@ def kind_of(status: dict[str, object]) -> object:
     return state["kind"]
 
 
-def test_it_is_set_up_backed_up_and_restored(bench: Bench, tmp_path: Path) -> None:
+def test_own_drive_is_configured_backed_up_and_restored(bench: Bench, tmp_path: Path) -> None:
     kept = tmp_path / "set.toml"
     bench.done("backup", str(kept))
     ramp = bench.kind.ramp
@@ -148,7 +148,7 @@ def test_it_is_set_up_backed_up_and_restored(bench: Bench, tmp_path: Path) -> No
     assert bench.values(ramp, "FANMODE", "DIMMING") == {**before, "FANMODE": 1, "DIMMING": 2}
 
 
-def test_it_never_gets_a_request_that_it_does_not_take(bench: Bench) -> None:
+def test_own_drive_gets_only_requests_it_accepts(bench: Bench) -> None:
     """All words at once: no read is longer than 8, none goes over a hole, none is refused."""
     profile = library.load_file(HERE / "profiles" / f"{bench.kind.profile}.toml")
     codes = [p.code for p in profile.parameters]

@@ -161,7 +161,7 @@ def logged() -> str:
 
 
 @pytest.mark.parametrize("screen", SCREENS)
-def test_an_error_on_a_screen_sends_the_stop_first(screen: str, tmp_path: Path) -> None:
+def test_error_on_a_screen_sends_the_stop_first(screen: str, tmp_path: Path) -> None:
     key, place = SCREENS[screen]
     with failing(tmp_path, ("RuntimeError", place)) as panel:
         if key:
@@ -177,7 +177,7 @@ def test_an_error_on_a_screen_sends_the_stop_first(screen: str, tmp_path: Path) 
 
 
 @pytest.mark.parametrize("dialog", DIALOGS)
-def test_an_error_in_a_dialog_sends_the_stop_first(dialog: str, tmp_path: Path) -> None:
+def test_error_in_a_dialog_sends_the_stop_first(dialog: str, tmp_path: Path) -> None:
     place = f"tui.screens.{DIALOGS[dialog]}:{dialog}.draw_frame"
     with failing(tmp_path, ("RuntimeError", place), dialog=dialog) as panel:
         (tmp_path / "open").touch()
@@ -188,14 +188,14 @@ def test_an_error_in_a_dialog_sends_the_stop_first(dialog: str, tmp_path: Path) 
     assert output[-1] == "Device 1: stopped."
 
 
-def test_every_dialog_is_among_these() -> None:
+def test_every_dialog_is_tested() -> None:
     from tests.ui.test_dialog_keys import dialogs_there_are
 
     assert dialogs_there_are() == set(DIALOGS)
 
 
 @pytest.mark.parametrize("name", PLACES)
-def test_an_error_anywhere_else_sends_the_stop_first(name: str, tmp_path: Path) -> None:
+def test_error_anywhere_else_sends_the_stop_first(name: str, tmp_path: Path) -> None:
     keys, place = PLACES[name]
     with failing(tmp_path, ("RuntimeError", place)) as panel:
         output = below(end(panel, tmp_path, keys))
@@ -203,7 +203,7 @@ def test_an_error_anywhere_else_sends_the_stop_first(name: str, tmp_path: Path) 
     assert output[-1] == "Device 1: stopped."
 
 
-def test_a_dialog_that_cannot_be_made_sends_the_stop_first(tmp_path: Path) -> None:
+def test_dialog_that_cannot_be_created_sends_the_stop_first(tmp_path: Path) -> None:
     for method in ("compose", "on_mount"):
         (folder := tmp_path / method).mkdir()
         place = f"tui.screens.messages.screen:MessagesScreen.{method}"
@@ -212,7 +212,7 @@ def test_a_dialog_that_cannot_be_made_sends_the_stop_first(tmp_path: Path) -> No
 
 
 @pytest.mark.parametrize("error", ERRORS)
-def test_whatever_the_error_is_the_stop_goes_out_first(error: str, tmp_path: Path) -> None:
+def test_every_kind_of_error_sends_the_stop_first(error: str, tmp_path: Path) -> None:
     with failing(tmp_path, (error, DRAW)) as panel:
         output = below(end(panel, tmp_path))
     assert output[0].startswith("The panel had to stop after an internal error (")
@@ -221,7 +221,7 @@ def test_whatever_the_error_is_the_stop_goes_out_first(error: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize("second", SECOND)
-def test_a_second_error_keeps_no_stop_back(second: str, tmp_path: Path) -> None:
+def test_second_error_does_not_block_the_stop(second: str, tmp_path: Path) -> None:
     with failing(tmp_path, ("RuntimeError", DRAW), ("RuntimeError", SECOND[second])) as panel:
         output = below(end(panel, tmp_path))
     assert output[0].startswith("The panel had to stop after an internal error (RuntimeError")
@@ -229,7 +229,9 @@ def test_a_second_error_keeps_no_stop_back(second: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("second", UNSEEN)
-def test_second_error_in_the_wait_is_reported_as_unknown(second: str, tmp_path: Path) -> None:
+def test_second_error_during_the_wait_reports_an_unknown_result(
+    second: str, tmp_path: Path
+) -> None:
     error, place, begin = UNSEEN[second]
     with failing(tmp_path, ("RuntimeError", DRAW), (error, place)) as panel:
         writes, sent = len(panel.log.writes), len(panel.sent)
@@ -261,7 +263,7 @@ def is_usual(terminal: int) -> bool:
     return flags & usual == usual
 
 
-def test_input_is_held_until_the_motor_stands(tmp_path: Path) -> None:
+def test_input_is_held_until_standstill(tmp_path: Path) -> None:
     """Typed keys were echoed, and Ctrl-C ended the panel with status 130."""
     with failing(tmp_path, ("RuntimeError", DRAW)) as panel:
         sent = hold_the_ramp(panel, tmp_path)
@@ -290,7 +292,7 @@ ENDS = {
 
 
 @pytest.mark.parametrize("number", ENDS)
-def test_no_signal_ends_the_wait_for_the_motor(number: signal.Signals, tmp_path: Path) -> None:
+def test_signals_do_not_end_the_wait_for_the_motor(number: signal.Signals, tmp_path: Path) -> None:
     with failing(tmp_path, ("RuntimeError", DRAW)) as panel:
         sent = hold_the_ramp(panel, tmp_path)
         os.kill(panel.pid, number)
@@ -312,12 +314,12 @@ def test_signal_ends_a_wait_that_hangs_and_restores_the_terminal(tmp_path: Path)
 
 
 @pytest.mark.parametrize("hang", HANGS)
-def test_an_end_that_hangs_is_ended(hang: str, tmp_path: Path) -> None:
+def test_hung_exit_is_ended(hang: str, tmp_path: Path) -> None:
     with failing(tmp_path, ("RuntimeError", DRAW), ("hang", HANGS[hang])) as panel:
         end(panel, tmp_path)
 
 
-def test_a_terminal_that_takes_nothing_holds_up_neither_the_stop_nor_the_end(
+def test_blocked_terminal_delays_neither_the_stop_nor_the_exit(
     tmp_path: Path,
 ) -> None:
     # from many frames on its buffer is full: nobody reads here
@@ -334,7 +336,7 @@ def test_a_terminal_that_takes_nothing_holds_up_neither_the_stop_nor_the_end(
         assert panel.simulation.drive(1).motor.frequency == 0
 
 
-def test_an_error_leaves_motors_running_that_are_to_run_on(tmp_path: Path) -> None:
+def test_error_keeps_motors_running_if_chosen(tmp_path: Path) -> None:
     options = ("--on-hangup", "leave-running")
     with failing(tmp_path, ("RuntimeError", DRAW), options=options) as panel:
         writes = len(panel.log.writes)

@@ -48,7 +48,9 @@ def inside(program: Served) -> int:
     return int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
 
 
-def test_motor_of_killed_program_is_stopped_beside_one_with_its_pid(programs: ExitStack) -> None:
+def test_motor_of_a_killed_program_is_stopped_although_its_pid_is_in_use(
+    programs: ExitStack,
+) -> None:
     with bench() as (simulation, line):
         recorder = programs.enter_context(served([*OF_ITS_OWN, *records(line)], ready="{"))
         command = [*OF_ITS_OWN, *runs_a_motor(line)]

@@ -177,7 +177,7 @@ def test_cycles_are_retained_and_no_message_writes(
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
-def test_the_last_will_comes_within_one_and_a_half_keep_alives(
+def test_last_will_is_published_within_one_and_a_half_keep_alives(
     programs: ExitStack, broker: RealBroker, number: signal.Signals
 ) -> None:
     made = publishing(programs, broker)
@@ -189,9 +189,7 @@ def test_the_last_will_comes_within_one_and_a_half_keep_alives(
     made.program.process.kill()
 
 
-def test_a_broker_that_comes_back_is_informed_everything_anew(
-    programs: ExitStack, broker: RealBroker
-) -> None:
+def test_returning_broker_gets_everything_again(programs: ExitStack, broker: RealBroker) -> None:
     made = publishing(programs, broker)
     broker.end()
     for kept in broker.folder.glob("*.db"):
@@ -208,9 +206,7 @@ def test_a_broker_that_comes_back_is_informed_everything_anew(
     assert "is connected again." in output
 
 
-def test_publish_beside_serve_takes_the_codes_that_are_named(
-    programs: ExitStack, broker: RealBroker
-) -> None:
+def test_publish_beside_serve_uses_the_named_codes(programs: ExitStack, broker: RealBroker) -> None:
     simulation, line = programs.enter_context(bench())
     programs.enter_context(served(serving(line), ready="Ready:"))
     command = [*serving()[:-1], "publish", line, "ACC", *to_broker(broker)]
@@ -222,7 +218,7 @@ def test_publish_beside_serve_takes_the_codes_that_are_named(
     assert broker.status == "offline"
 
 
-def test_a_wrong_password_is_reported(
+def test_wrong_password_is_reported(
     programs: ExitStack, broker: RealBroker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(PASSWORD_SETTING, "another")
@@ -239,7 +235,7 @@ def test_a_wrong_password_is_reported(
 # A motor whose client has died
 
 
-def test_publishing_keeps_no_motor_running_whose_client_died(programs: ExitStack) -> None:
+def test_publish_does_not_keep_the_motor_of_a_dead_client_running(programs: ExitStack) -> None:
     spec = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 20})
     simulation, line = programs.enter_context(bench(spec))
     options = ["--tcp", "127.0.0.1:0", "--allow-commands", "--metrics", ":0", "--every", "0.2"]
@@ -252,7 +248,7 @@ def test_publishing_keeps_no_motor_running_whose_client_died(programs: ExitStack
 
 
 @pytest.mark.usefixtures("held_inside")
-def test_a_serve_that_comes_back_feeds_no_motor_of_the_one_before(programs: ExitStack) -> None:
+def test_restarted_serve_does_not_keep_earlier_motors_alive(programs: ExitStack) -> None:
     spec = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 30})
     simulation, line = programs.enter_context(bench(spec))
     options = ["--tcp", "127.0.0.1:0", "--allow-commands", "--metrics", ":0", "--every", "0.2"]
@@ -268,7 +264,7 @@ def test_a_serve_that_comes_back_feeds_no_motor_of_the_one_before(programs: Exit
     wait_until(lambda: "fault_info{" in scraped(again), "it is read again")
 
 
-def test_publish_beside_serve_feeds_no_motor_whose_client_died(programs: ExitStack) -> None:
+def test_publish_beside_serve_does_not_keep_orphan_motors_alive(programs: ExitStack) -> None:
     spec = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 50})
     simulation, line = programs.enter_context(bench(spec))
     command = serving(line, "--tcp", "127.0.0.1:0", "--allow-commands")
@@ -294,7 +290,7 @@ def scraped(program: Served) -> str:
 # Prometheus
 
 
-def test_promtool_finds_nothing_wrong(peer: Peer, tmp_path: Path) -> None:
+def test_promtool_accepts_the_metrics(peer: Peer, tmp_path: Path) -> None:
     promtool = peer("promtool", "prometheus")
     rules = tmp_path / "drives.rules.yml"
     rules.write_text(printed("yaml", "drives.rules.yml"), "utf-8")
@@ -321,7 +317,7 @@ def test_promtool_finds_nothing_wrong(peer: Peer, tmp_path: Path) -> None:
         assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_prometheus_collects_values_and_sees_a_fault(
+def test_prometheus_collects_values_and_a_fault(
     programs: ExitStack, peer: Peer, tmp_path: Path
 ) -> None:
     prometheus = peer("prometheus", "prometheus")

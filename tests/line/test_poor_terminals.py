@@ -34,7 +34,7 @@ def test_stop_keys_stop_on_a_poor_terminal(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["too small", "much too small"])
-def test_on_a_terminal_that_is_too_small_only_stop_keys_do_anything(name: str) -> None:
+def test_only_stop_keys_work_on_a_too_small_terminal(name: str) -> None:
     options, environment, size = TERMINALS[name]
     with panel_on_a_pty(*options, size=size, environment=environment) as panel:
         for key in ("a", "r", "3", "0", "\r", "y", "k", "e", "z", "y", "w", "q", "y"):

@@ -57,7 +57,7 @@ def motor_of_a_script(script: str) -> Iterator[tuple[Simulation, str, Served]]:
 
 
 @KINDS
-def test_the_keeper_stops_the_motor_of_a_killed_script(kind: str) -> None:
+def test_keeper_stops_the_motor_of_a_killed_script(kind: str) -> None:
     with motor_of_a_script(SCRIPTS[kind]) as (simulation, _, program):
         assert on_record() == [False]
         program.process.kill()
@@ -65,7 +65,7 @@ def test_the_keeper_stops_the_motor_of_a_killed_script(kind: str) -> None:
         wait_until(lambda: on_record() == [], "the record is removed")
 
 
-def test_the_motor_of_a_frozen_script_is_stopped_and_not_restarted() -> None:
+def test_motor_of_a_frozen_script_is_stopped_and_not_restarted() -> None:
     with motor_of_a_script(BLOCKING.format(body=WAIT)) as (simulation, _, program):
         program.process.send_signal(signal.SIGSTOP)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops on its ramp", 20.0)
@@ -84,7 +84,7 @@ def test_the_motor_of_a_frozen_script_is_stopped_and_not_restarted() -> None:
     ("number", "status"),
     [(signal.SIGTERM, 143), (signal.SIGHUP, 129), (signal.SIGINT, -signal.SIGINT)],
 )
-def test_a_signal_stops_the_motor_before_the_script_ends(
+def test_signal_stops_the_motor_before_the_script_ends(
     kind: str, number: signal.Signals, status: int
 ) -> None:
     with motor_of_a_script(SCRIPTS[kind]) as (simulation, _, program):
@@ -97,7 +97,7 @@ def test_a_signal_stops_the_motor_before_the_script_ends(
         wait_until(lambda: on_record() == [], "the record is removed")
 
 
-def test_a_third_ctrl_c_ends_an_async_script_and_its_motor_is_stopped() -> None:
+def test_third_ctrl_c_ends_an_async_script_and_stops_its_motor() -> None:
     """With that, asyncio no longer waits for its tasks."""
     with motor_of_a_script(ASYNC) as (simulation, _, program):
         for _ in range(5):
@@ -108,7 +108,7 @@ def test_a_third_ctrl_c_ends_an_async_script_and_its_motor_is_stopped() -> None:
         wait_until(lambda: on_record() == [], "the record is removed")
 
 
-def test_a_stop_by_another_program_is_reported_at_the_end_of_the_block() -> None:
+def test_stop_by_another_program_is_reported_at_the_end_of_the_block() -> None:
     with motor_of_a_script(BLOCKING.format(body=WAIT)) as (simulation, line, program):
         done = drivepanel("stop", line, "-d", "1", "-p", "atv71")
         assert done.returncode == 0, done.stderr
@@ -129,7 +129,7 @@ def test_another_program_cannot_command_the_drive_of_a_block() -> None:
         assert turns(simulation)
 
 
-def test_a_script_that_leaves_its_line_open_in_a_thread_has_its_motor_stopped() -> None:
+def test_motor_of_a_script_with_an_open_line_in_a_thread_is_stopped() -> None:
     """The interpreter ends while a daemon thread is inside the block."""
     script = """
 import sys, threading

@@ -141,7 +141,7 @@ def test_modbus_serial_writes_what_is_allowed(node: str) -> None:
         assert made.simulation.drive(1).raw("ACC") == 64
 
 
-def test_a_run_word_is_exception_6_while_a_program_commands(programs: ExitStack) -> None:
+def test_run_word_is_exception_6_while_a_program_commands(programs: ExitStack) -> None:
     with gateway("--allow-commands", "--allow-writes", "all") as made:
         runner = run_beside(programs, made)
         with made.client() as client:
@@ -154,7 +154,7 @@ def test_a_run_word_is_exception_6_while_a_program_commands(programs: ExitStack)
         assert turns(made.simulation)
 
 
-def test_ids_of_two_lines(programs: ExitStack) -> None:
+def test_unit_ids_map_to_two_lines(programs: ExitStack) -> None:
     with bench(DriveSpec("atv71", 1)) as (_, text), bench(DriveSpec("atv31", 1)) as (_, other):
         command = serving(text, other, "--tcp", ":0", "--map", "1=1", "--map", "101-110=2@1")
         made = programs.enter_context(served(command, ready="Ready:"))
@@ -168,7 +168,7 @@ def test_ids_of_two_lines(programs: ExitStack) -> None:
             assert missing.exception_code == 10
 
 
-def test_a_name_says_what_a_drive_is_that_does_not(programs: ExitStack) -> None:
+def test_named_line_sets_the_profile_of_an_unidentified_drive(programs: ExitStack) -> None:
     """A Leroy-Somer drive is not commanded unless it is known which it is."""
     drives = DriveSpec("powerdrive", 3)
     with bench(drives) as (simulation, line):
@@ -190,7 +190,7 @@ def test_a_name_says_what_a_drive_is_that_does_not(programs: ExitStack) -> None:
         wait_until(read, "the drive of the name is read")
 
 
-def test_it_warns_where_other_computers_reach_it() -> None:
+def test_serve_warns_if_other_computers_can_connect() -> None:
     with bench() as (_, line):
         command = serving(line, "--tcp", "0.0.0.0:0", "--allow-commands")
         with served(command, ready="reads and commands") as program:
@@ -202,7 +202,7 @@ def test_it_warns_where_other_computers_reach_it() -> None:
 # Its end, and the end of others
 
 
-def test_sigterm_ends_it_with_0_and_systemd_is_reported(
+def test_sigterm_exits_with_0_and_notifies_systemd(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as systemd:
@@ -218,12 +218,12 @@ def test_sigterm_ends_it_with_0_and_systemd_is_reported(
             assert systemd.recv(500).startswith(b"STOPPING=1")
 
 
-def test_ctrl_c_ends_it_with_130() -> None:
+def test_ctrl_c_exits_with_130() -> None:
     with bench() as (_, line), served(serving(line), ready="Ready:") as program:
         assert program.end(signal.SIGINT)[0] == 130
 
 
-def test_whoever_is_attached_goes_on_where_it_is_killed(programs: ExitStack) -> None:
+def test_attached_programs_continue_if_serve_is_killed(programs: ExitStack) -> None:
     with gateway() as made:
         recorder = programs.enter_context(served(records(made.line), ready="{"))
         made.program.process.kill()
@@ -237,7 +237,7 @@ def test_whoever_is_attached_goes_on_where_it_is_killed(programs: ExitStack) -> 
         assert "Shared with watch" in output
 
 
-def test_it_becomes_the_owner_when_the_one_before_ends(programs: ExitStack) -> None:
+def test_serve_becomes_the_owner_when_the_previous_one_exits(programs: ExitStack) -> None:
     with bench() as (simulation, line):
         recorder = programs.enter_context(served(records(line), ready="{"))
         command = serving(line, "--tcp", "127.0.0.1:0")
@@ -276,7 +276,7 @@ ENDS = {
 
 
 @pytest.mark.parametrize("number", ENDS)
-def test_its_end_stops_a_motor_that_a_client_started(number: signal.Signals) -> None:
+def test_serve_stops_the_motor_of_a_client_at_its_exit(number: signal.Signals) -> None:
     with gateway("--allow-commands", specs=(ENABLED,)) as made:
         started_by_a_client(made)
         status, output = made.program.end(number)
@@ -286,7 +286,7 @@ def test_its_end_stops_a_motor_that_a_client_started(number: signal.Signals) -> 
         assert made.simulation.drive(1).fault is None
 
 
-def test_a_motor_that_a_client_started_is_stopped_where_it_is_killed(programs: ExitStack) -> None:
+def test_motor_of_a_client_is_stopped_if_serve_is_killed(programs: ExitStack) -> None:
     with gateway("--allow-commands", specs=(ENABLED,)) as made:
         programs.enter_context(served(records(made.line), ready="{"))
         started_by_a_client(made)
@@ -295,7 +295,7 @@ def test_a_motor_that_a_client_started_is_stopped_where_it_is_killed(programs: E
         assert made.simulation.drive(1).fault is None
 
 
-def test_a_motor_that_a_program_left_is_stopped_by_it(programs: ExitStack) -> None:
+def test_serve_stops_a_motor_left_by_another_program(programs: ExitStack) -> None:
     with gateway() as made:
         runner = run_beside(programs, made)
         runner.process.kill()

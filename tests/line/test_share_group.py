@@ -88,9 +88,7 @@ def end(*programs: subprocess.Popen[str]) -> None:
         program.communicate("\n", timeout=20.0)
 
 
-def test_a_member_attaches_without_setup_and_a_stranger_does_not(
-    folder: Path, tcp_line: str
-) -> None:
+def test_group_member_attaches_without_setup_but_others_do_not(folder: Path, tcp_line: str) -> None:
     number = str(grp.getgrnam(GROUP).gr_gid)
     owner = program(tcp_line, MEMBER, number, folder, DRIVEPANEL_SHARE_GROUP=GROUP)
     assert output(owner) == "[]"
@@ -102,9 +100,7 @@ def test_a_member_attaches_without_setup_and_a_stranger_does_not(
     assert not list(folder.glob("*.sock"))
 
 
-def test_nobody_of_another_user_attaches_unless_it_was_requested(
-    folder: Path, tcp_line: str
-) -> None:
+def test_other_users_attach_only_if_enabled(folder: Path, tcp_line: str) -> None:
     number = str(grp.getgrnam(GROUP).gr_gid)
     owner = program(tcp_line, MEMBER, number, folder)
     assert output(owner) == "[]"
@@ -113,7 +109,7 @@ def test_nobody_of_another_user_attaches_unless_it_was_requested(
     end(other, owner)
 
 
-def test_a_group_without_a_folder_is_informed_what_to_do(tmp_path: Path, tcp_line: str) -> None:
+def test_group_without_a_folder_gets_advice(tmp_path: Path, tcp_line: str) -> None:
     if os.geteuid() != 0:
         pytest.skip(ROOT_NEEDED)
     process = program(tcp_line, 0, "", tmp_path / "none", DRIVEPANEL_SHARE_GROUP=GROUP)

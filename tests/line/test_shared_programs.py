@@ -80,7 +80,7 @@ def motor_run(
 
 @pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("first", ["watch", "run"])
-def test_a_motor_whose_program_was_killed_is_stopped_by_who_goes_on(
+def test_motor_of_a_killed_program_is_stopped_by_the_remaining_one(
     programs: ExitStack, first: str
 ) -> None:
     """A recorder asks the drive on and on: its own timeout would never stop the motor."""
@@ -96,7 +96,7 @@ def test_a_motor_whose_program_was_killed_is_stopped_by_who_goes_on(
 
 @pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("first", ["watch", "run"])
-def test_a_motor_that_should_be_left_running_runs_on(programs: ExitStack, first: str) -> None:
+def test_motor_left_running_on_purpose_keeps_running(programs: ExitStack, first: str) -> None:
     with motor_run(programs, first, "--leave-running") as (simulation, _, runner, recorder):
         runner.process.kill()
         time.sleep(3)
@@ -110,7 +110,7 @@ NAMED = pytest.mark.parametrize(
 
 
 @NAMED
-def test_a_stop_of_the_motor_of_a_frozen_program_lasts(
+def test_stop_of_the_motor_of_a_frozen_program_lasts(
     programs: ExitStack, named: tuple[str, ...]
 ) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, _):
@@ -151,7 +151,7 @@ def test_stop_after_a_malformed_greeting_stops_the_motor(programs: ExitStack, co
         assert recorder.process.poll() is None
 
 
-def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
+def test_recorder_does_not_keep_the_motor_of_a_frozen_program_alive_forever(
     programs: ExitStack, holder: str
 ) -> None:
     """Its socket stays open, its process lives: nothing but its silence tells."""
@@ -174,7 +174,7 @@ def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
         assert left_over() == []
 
 
-def test_the_motor_of_a_frozen_program_is_taken_over_by_a_key(
+def test_motor_of_a_frozen_program_is_taken_over_by_a_key(
     programs: ExitStack, terminal_with: Start
 ) -> None:
     with motor_run(programs, "watch", time_out=300) as (simulation, line, runner, _):
@@ -233,7 +233,7 @@ def one_connection(target: tuple[str, int], others: str) -> Iterator[str]:
 @pytest.mark.usefixtures("held_inside")
 @NAMED
 @pytest.mark.parametrize("number", [signal.SIGCONT, signal.SIGKILL])
-def test_a_stop_that_a_frozen_owner_holds_up_is_reported_and_carried_out(
+def test_stop_delayed_by_a_frozen_owner_is_reported_and_carried_out(
     programs: ExitStack, named: tuple[str, ...], number: signal.Signals
 ) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, recorder):
@@ -257,7 +257,7 @@ def test_a_stop_that_a_frozen_owner_holds_up_is_reported_and_carried_out(
 
 
 @pytest.mark.usefixtures("held_inside")
-def test_nobody_feeds_the_motor_of_an_owner_that_is_frozen(programs: ExitStack) -> None:
+def test_motor_of_a_frozen_owner_is_not_kept_alive(programs: ExitStack) -> None:
     """The drive's own timeout stops it, as it would if nobody shared the line."""
     with motor_run(programs, "run", time_out=20) as (simulation, _, runner, recorder):
         runner.process.send_signal(signal.SIGSTOP)
@@ -271,7 +271,7 @@ def test_nobody_feeds_the_motor_of_an_owner_that_is_frozen(programs: ExitStack) 
 
 
 @pytest.mark.usefixtures("holder")
-def test_a_stop_beside_run_ends_it_and_names_that_program(programs: ExitStack) -> None:
+def test_stop_beside_run_ends_it_and_names_the_program(programs: ExitStack) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, recorder):
         assert drivepanel("stop", line, "-d", "1", "-p", "atv71").returncode == 0
         assert stopped_by_commands(simulation)
@@ -289,7 +289,7 @@ def test_a_stop_beside_run_ends_it_and_names_that_program(programs: ExitStack) -
         assert left_over() == []
 
 
-def test_a_drive_that_run_commands_takes_nothing_from_another_command(
+def test_drive_commanded_by_run_refuses_other_commands(
     programs: ExitStack,
 ) -> None:
     with motor_run(programs, "run") as (simulation, line, runner, _):
@@ -347,7 +347,7 @@ def test_hangup_choice_applies_to_every_loss_of_the_panel(
 
 
 @pytest.mark.usefixtures("holder")
-def test_by_default_the_motor_of_a_killed_panel_is_stopped(
+def test_motor_of_a_killed_panel_is_stopped_by_default(
     programs: ExitStack, terminal_with: Start
 ) -> None:
     with panel_run(programs, terminal_with) as (made, recorder):
@@ -364,7 +364,7 @@ def test_by_default_the_motor_of_a_killed_panel_is_stopped(
 # Two panels
 
 
-def test_a_stop_in_one_panel_stops_the_motor_of_the_other(
+def test_stop_in_one_panel_stops_the_motor_of_the_other(
     terminal_with: Start, second_terminal: Start
 ) -> None:
     with panel_running(terminal_with) as made:
@@ -380,7 +380,7 @@ def test_a_stop_in_one_panel_stops_the_motor_of_the_other(
 
 @pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGKILL])
-def test_a_motor_of_a_panel_that_goes_is_stopped_and_the_other_panel_goes_on(
+def test_exiting_panel_stops_its_motor_and_the_other_panel_continues(
     terminal_with: Start, second_terminal: Start, number: signal.Signals
 ) -> None:
     with panel_running(terminal_with) as made:
@@ -398,9 +398,7 @@ def test_a_motor_of_a_panel_that_goes_is_stopped_and_the_other_panel_goes_on(
 
 @pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("first", ["alone", "watch"])
-def test_a_command_that_comes_late_to_the_line_knows_of_a_stop_before(
-    programs: ExitStack, first: str
-) -> None:
+def test_late_command_is_refused_after_a_stop(programs: ExitStack, first: str) -> None:
     """On a machine that swaps a stop typed last may be through before the run is on the line."""
     with bench() as (simulation, line):
         if first == "watch":

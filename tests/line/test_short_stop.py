@@ -67,7 +67,7 @@ def test_stop_reaches_the_keeper_before_anything_is_imported(panel: OpenLine) ->
     assert not attached
 
 
-def test_stop_is_carried_out_by_the_keeper_alone() -> None:
+def test_stop_is_carried_out_by_the_keeper() -> None:
     with ExitStack() as programs, motor_run(programs, "watch") as (simulation, line, runner, _):
         command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "-d", "1"]
         done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
@@ -76,14 +76,14 @@ def test_stop_is_carried_out_by_the_keeper_alone() -> None:
         assert runner.process.wait(PATIENCE) == 6
 
 
-def test_stop_of_all_is_carried_out_by_the_keeper_alone() -> None:
+def test_stop_all_is_carried_out_by_the_keeper() -> None:
     with ExitStack() as programs, motor_run(programs, "watch") as (simulation, line, _, _):
         command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", line, "--all"]
         subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
 
 
-def test_stop_after_its_short_way_is_carried_out_and_reported_as_usual(panel: OpenLine) -> None:
+def test_stop_after_a_short_stop_is_carried_out_and_reported_normally(panel: OpenLine) -> None:
     heard = stops_heard(panel.line.facts)
     done = drivepanel("stop", panel.text, "-d", "1", "-p", "atv71")
     assert done.returncode == 0, done.stderr
@@ -94,7 +94,7 @@ def test_stop_after_its_short_way_is_carried_out_and_reported_as_usual(panel: Op
     assert [attached for *_, attached in heard[:2]] == [False, True]
 
 
-def test_stop_of_another_kind_takes_no_short_way(panel: OpenLine) -> None:
+def test_other_kinds_of_stop_are_not_short_stops(panel: OpenLine) -> None:
     heard = stops_heard(panel.line.facts)
     for words in (["--quick"], ["--read-only"], ["--all", "--addresses", "1-2"]):
         command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", panel.text, *words]
@@ -103,14 +103,14 @@ def test_stop_of_another_kind_takes_no_short_way(panel: OpenLine) -> None:
     assert {devices for devices, *_ in heard} == {(1,)}
 
 
-def test_stop_on_a_line_that_no_process_holds_starts_none() -> None:
+def test_short_stop_on_an_unused_line_starts_no_keeper() -> None:
     with bench() as (_, line):
         done = drivepanel("stop", line, "-p", "atv71")
         assert done.returncode == 0, done.stderr
         assert keepers() == []
 
 
-def test_program_that_came_during_a_stop_goes_on_with_a_keeper() -> None:
+def test_program_started_during_a_stop_continues_with_a_keeper() -> None:
     slow = DriveSpec("atv71", 1, sets={"DEC": 1000}, run_hz=40)
     with bench(slow) as (simulation, line):
         command = [*DRIVEPANEL, "stop", line, "-p", "atv71"]

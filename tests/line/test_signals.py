@@ -82,7 +82,7 @@ def stopped_by(number: int) -> tuple[int, float, bool, str]:
     return 0, 0.0, False, signal_name(signal.SIGTERM if number in FROM_OUTSIDE else number)
 
 
-def test_run_stops_its_motor_at_every_signal_that_ends_a_process() -> None:
+def test_run_stops_its_motor_on_every_terminating_signal() -> None:
     with ThreadPoolExecutor(AT_ONCE) as pool:
         ends = dict(zip(ENDING, pool.map(run_and_signal, ENDING), strict=True))
     assert ends == {number: stopped_by(number) for number in ENDING}
@@ -93,14 +93,14 @@ def test_run_stops_its_motor_once_when_many_signals_arrive() -> None:
     assert (status, hertz, tripped, len(why.split())) == (0, 0.0, False, 1)
 
 
-def test_run_ignores_a_hangup_that_was_ignored_at_its_start() -> None:
+def test_run_ignores_a_hangup_ignored_at_its_start() -> None:
     """As by nohup."""
     end = run_and_signal(signal.SIGHUP, signal.SIGUSR2, ignored=True)
     assert end == stopped_by(signal.SIGUSR2)
 
 
 @pytest.mark.parametrize("number", A_FEW, ids=signal_name)
-def test_the_panel_stops_its_motor_first(number: int) -> None:
+def test_panel_stops_its_motor_before_it_ends(number: int) -> None:
     with panel_on_a_pty() as panel:
         panel.run()
         before = len(panel.log.writes)
@@ -112,7 +112,7 @@ def test_the_panel_stops_its_motor_first(number: int) -> None:
         assert termios.tcgetattr(panel.terminal)[3] & termios.ICANON
 
 
-def test_nothing_suspends_a_panel_and_it_says_so() -> None:
+def test_panel_cannot_be_suspended_and_says_so() -> None:
     with panel_on_a_pty() as panel:
         panel.run()
         for key, name in (("\x1a", "Ctrl+Z"), ("\x1c", "Ctrl+\\"), ("\x03", "Ctrl+C")):
@@ -127,7 +127,7 @@ def test_nothing_suspends_a_panel_and_it_says_so() -> None:
         panel.stopped(before)
 
 
-def test_a_panel_that_continues_after_a_suspension_reads_its_keys_once() -> None:
+def test_resumed_panel_reads_its_keys_once() -> None:
     """Textual opened the terminal a second time, with a second thread for the keys."""
     with panel_on_a_pty() as panel:
         tasks = Path(f"/proc/{panel.pid}/task")
@@ -146,7 +146,7 @@ def test_a_panel_that_continues_after_a_suspension_reads_its_keys_once() -> None
 
 
 @pytest.mark.parametrize("drawn", [True, False])
-def test_a_panel_that_opens_ends_by_a_signal_and_leaves_the_terminal_as_it_was(drawn: bool) -> None:
+def test_signal_ends_an_opening_panel_and_restores_the_terminal(drawn: bool) -> None:
     pid, terminal = start_panel(["sim:atv71", "-d", "1"])
     panel = looked_at(pid, terminal)
     try:
@@ -181,7 +181,7 @@ number of the signal that ends them."""
 
 
 @pytest.mark.parametrize("name", OWNERS)
-def test_nothing_suspends_a_command_that_owns_a_line(name: str) -> None:
+def test_command_that_owns_a_line_cannot_be_suspended(name: str) -> None:
     words, ready, plus = OWNERS[name]
     command = [*DRIVEPANEL, name.split()[0], *words]
     with served(command, ready=ready) as program:
@@ -198,7 +198,7 @@ def test_nothing_suspends_a_command_that_owns_a_line(name: str) -> None:
         reading.join()
 
 
-def test_keys_of_a_terminal_in_its_usual_mode_stop_and_never_suspend_a_run() -> None:
+def test_terminal_keys_stop_and_never_suspend_a_run() -> None:
     with Simulation([DriveSpec("atv71", 1, sets={"TTO": 300})]) as simulation:
         host, port = simulation.serve_tcp()
         words = ["run", f"tcp:{host}:{port}", "-d", "1", "--reference", "10Hz", "--arm"]
@@ -228,7 +228,7 @@ with never_suspended(), handled(lambda *_: print("handled")):
 """
 
 
-def test_an_error_of_its_own_ends_the_process_immediately() -> None:
+def test_segmentation_fault_ends_the_process_immediately() -> None:
     """A handler would return to the instruction that failed, again and again."""
     done = subprocess.run(
         [sys.executable, "-c", REAL_ERROR], capture_output=True, timeout=PATIENCE, check=False

@@ -34,7 +34,7 @@ def frequency(line: str) -> float:
     return float(json.loads(done.stdout)["values"]["rFr"]["value"])
 
 
-def test_a_line_on_standard_input_runs_the_motor_as_a_hand_at_the_terminals_would() -> None:
+def test_standard_input_sets_inputs_and_runs_the_motor() -> None:
     way = ("atv312@2", "--set", "FR1=1", "--tcp", "0")
     with simulated(*way, stdin=subprocess.PIPE) as simulation:
         line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
@@ -52,7 +52,7 @@ def test_a_line_on_standard_input_runs_the_motor_as_a_hand_at_the_terminals_woul
 
 
 @pytest.mark.parametrize(("more", "status"), [((), 3), (("--any-settings",), 0)])
-def test_another_baud_is_not_understood_unless_any_settings_are(
+def test_other_baud_is_ignored_unless_any_settings_is_given(
     more: tuple[str, ...], status: int, tmp_path: Path
 ) -> None:
     link = str(tmp_path / "line")
@@ -63,7 +63,7 @@ def test_another_baud_is_not_understood_unless_any_settings_are(
         assert other.returncode == status, other.stderr
 
 
-def test_it_ends_well_while_nobody_reads_what_it_says() -> None:
+def test_simulate_ends_normally_with_unread_output() -> None:
     """A thread that waits for its reader in a buffer of Python aborted the program at its end."""
     with simulated("atv312@2", "--tcp", "0", stdin=subprocess.PIPE) as simulation:
         process = simulation.process

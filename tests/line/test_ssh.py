@@ -102,7 +102,7 @@ def panel_over(host: SshHost, tmp_path: Path, *arguments: str) -> list[str]:
     return [*host.login, f"sh -c {shlex.quote(remote)}"]
 
 
-def test_the_demo_over_ssh(
+def test_demo_runs_over_ssh(
     ssh_host: SshHost, terminal_with: Callable[[list[str]], Terminal], tmp_path: Path
 ) -> None:
     terminal = terminal_with(panel_over(ssh_host, tmp_path, "demo"))
@@ -122,7 +122,7 @@ SETTLED = 0.5
 """Seconds that a question has stood before its answer counts, and a little more."""
 
 
-def test_a_terminal_that_stands_still_does_not_stop_the_polling(
+def test_blocked_terminal_does_not_stop_polling(
     ssh_host: SshHost, terminal_with: Callable[[list[str]], Terminal], tmp_path: Path
 ) -> None:
     with (

@@ -27,7 +27,7 @@ main()
 """The program; whatever it does with a file in the state folder hangs."""
 
 
-def test_stop_beside_killed_keeper_waits_for_no_disk() -> None:
+def test_stop_after_a_killed_keeper_does_not_wait_for_the_disk() -> None:
     with Simulation([DriveSpec("atv71", 2, run_hz=30.0)]) as simulation:
         line = rtu_tcp(simulation)
         place = share_place(line)
@@ -43,5 +43,5 @@ def test_stop_beside_killed_keeper_waits_for_no_disk() -> None:
         assert simulation.drive(2).motor.frequency == 0
 
 
-def test_disk_keeps_a_stop_for_less_than_two_seconds() -> None:
+def test_hung_disk_delays_a_stop_for_less_than_2_s() -> None:
     assert _SENT_WITHIN + STOP_DISK_WITHIN + REMEMBERED_WITHIN < 2.0

@@ -125,7 +125,7 @@ def test_keeper_of_another_version_is_named_while_it_serves(
         assert turns(simulation)
 
 
-def test_keeper_of_another_version_makes_way_when_it_serves_nobody(
+def test_idle_keeper_of_another_version_is_replaced(
     next_version: Callable[[], None],
 ) -> None:
     with bench() as (_, line):
@@ -136,7 +136,7 @@ def test_keeper_of_another_version_makes_way_when_it_serves_nobody(
         assert keeper() != pid
 
 
-def test_keeper_whose_package_is_gone_stops_motor_of_killed_program(
+def test_keeper_without_its_package_stops_the_motor_of_a_killed_program(
     programs: ExitStack, package: Package
 ) -> None:
     with motor_run(programs, "run") as (simulation, _, runner, _):
@@ -145,7 +145,7 @@ def test_keeper_whose_package_is_gone_stops_motor_of_killed_program(
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
 
 
-def test_keeper_whose_package_is_gone_carries_out_plain_stop(
+def test_keeper_without_its_package_carries_out_a_plain_stop(
     programs: ExitStack, package: Package
 ) -> None:
     with motor_run(programs, "run") as (simulation, _, _, _):

@@ -66,7 +66,7 @@ def running(start: Start, *options: str, family: str = "atv71") -> Iterator[Runn
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
 @pytest.mark.parametrize("family", ["atv71", "atv21"])
-def test_a_signal_stops_the_motor_first(
+def test_signal_stops_the_motor_first(
     terminal_with: Start, number: signal.Signals, family: str
 ) -> None:
     with running(terminal_with, family=family) as made:
@@ -76,7 +76,7 @@ def test_a_signal_stops_the_motor_first(
         made.ended()
 
 
-def test_a_terminal_that_is_closed_stops_the_motor_first(terminal_with: Start) -> None:
+def test_closed_terminal_stops_the_motor_first(terminal_with: Start) -> None:
     with running(terminal_with) as made:
         made.terminal.run("kill-session")
         made.stopped()
@@ -84,14 +84,14 @@ def test_a_terminal_that_is_closed_stops_the_motor_first(terminal_with: Start) -
         made.ended()
 
 
-def test_leaving_it_running_is_a_choice(terminal_with: Start) -> None:
+def test_hangup_option_leaves_the_motor_running(terminal_with: Start) -> None:
     with running(terminal_with, "--on-hangup", "leave-running") as made:
         os.kill(made.pid, signal.SIGHUP)
         made.ended()
         assert made.speed > 2
 
 
-def test_ctrl_c_in_the_terminal_ends_nothing(terminal_with: Start) -> None:
+def test_ctrl_c_does_not_end_the_panel(terminal_with: Start) -> None:
     with running(terminal_with) as made:
         made.terminal.press("C-c")
         made.terminal.wait_for("FORWARD")
@@ -100,7 +100,7 @@ def test_ctrl_c_in_the_terminal_ends_nothing(terminal_with: Start) -> None:
         made.stopped()
 
 
-def test_leaving_by_key_asks_and_stops(terminal_with: Start) -> None:
+def test_exit_key_asks_and_stops(terminal_with: Start) -> None:
     with running(terminal_with) as made:
         made.terminal.press("q")
         made.terminal.wait_for("A motor runs by your command", "s or Enter")
@@ -109,7 +109,7 @@ def test_leaving_by_key_asks_and_stops(terminal_with: Start) -> None:
         assert made.speed == 0
 
 
-def test_against_a_kill_only_the_drives_own_watch_helps(terminal_with: Start) -> None:
+def test_motor_of_a_killed_panel_is_stopped_by_the_drive_timeout(terminal_with: Start) -> None:
     with running(terminal_with) as made:
         made.simulation.drive(1).set("TTO", 10)
         os.kill(made.pid, signal.SIGKILL)

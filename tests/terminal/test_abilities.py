@@ -44,18 +44,18 @@ LOCALES = [
 
 
 @pytest.mark.parametrize(("environment", "encoding"), LOCALES)
-def test_the_locale_tells_the_signs(environment: dict[str, str], encoding: str) -> None:
+def test_locale_sets_the_encoding(environment: dict[str, str], encoding: str) -> None:
     assert encoding_of(environment) == encoding
 
 
-def test_latin_1_counts_where_python_writes_it() -> None:
+def test_latin_1_is_used_only_if_python_writes_it() -> None:
     environment = {"LANG": "fr_FR.ISO-8859-1"}
     assert encoding_of(environment, "iso-8859-1") == "iso8859-1"
     assert encoding_of(environment, "utf-8") == ASCII, "two bytes would be two signs there"
 
 
 @pytest.mark.parametrize(("ascii", "encoding"), [(True, ASCII), (False, UTF_8)])
-def test_a_person_who_says_it_is_right(ascii: bool, encoding: str) -> None:
+def test_ascii_option_overrides_the_locale(ascii: bool, encoding: str) -> None:
     for environment in ({"LANG": "en_US.UTF-8"}, {"LANG": "C"}):
         assert abilities_of(environment, ascii=ascii).encoding == encoding
 
@@ -78,12 +78,14 @@ COLORS = [
 
 
 @pytest.mark.parametrize(("environment", "colors"), COLORS)
-def test_terminfo_tells_the_colors(environment: dict[str, str], colors: ColorSystem | None) -> None:
+def test_terminfo_sets_the_number_of_colors(
+    environment: dict[str, str], colors: ColorSystem | None
+) -> None:
     assert abilities_in(environment).colors == colors
 
 
 @pytest.mark.parametrize("term", ["vt100", "nobody-knows", "dumb", "screen"])
-def test_only_a_terminal_that_erases_in_color_is_let_erase(term: str) -> None:
+def test_erasing_is_used_only_with_background_color_erase(term: str) -> None:
     assert not abilities_in({"TERM": term}).erases
 
 
@@ -99,7 +101,7 @@ def abilities_in(environment: dict[str, str]) -> Abilities:
     return found
 
 
-def test_every_sign_of_the_panel_has_a_plain_one() -> None:
+def test_every_symbol_has_an_ascii_replacement() -> None:
     drawn = {
         character
         for path in Path(tui.__file__).parent.rglob("*.py")
@@ -111,13 +113,13 @@ def test_every_sign_of_the_panel_has_a_plain_one() -> None:
 
 
 @given(st.text(max_size=30))
-def test_a_text_in_plain_signs_is_ascii_and_as_wide(text: str) -> None:
+def test_plain_text_is_ascii_of_the_same_width(text: str) -> None:
     (segment,) = PlainSigns(ASCII).apply([Segment(text)], Color(0, 0, 0))
     assert segment.text.isascii()
     assert cell_len(segment.text) == cell_len(text)
 
 
-def test_latin_1_keeps_what_it_has() -> None:
+def test_latin_1_keeps_its_characters() -> None:
     assert in_encoding("µ ± ü · →", "iso8859-1") == "µ ± ü · >"
 
 
@@ -125,12 +127,12 @@ STYLES = [style for name, style in vars(palette).items() if isinstance(style, St
 
 
 @pytest.mark.parametrize("style", STYLES, ids=str)
-def test_in_sixteen_colors_words_are_never_of_the_color_behind_them(style: Style) -> None:
+def test_sixteen_colors_never_match_the_background(style: Style) -> None:
     shown = in_sixteen(Style(bgcolor=palette.GROUND) + style)
     assert shown.color is None or shown.color.number != shown.bgcolor.number  # type: ignore[union-attr]
 
 
-def test_ungrounded_input_stays_active() -> None:
+def test_styles_without_colors_stay_visible() -> None:
     assert without_colors(palette.CURSOR).reverse
     assert without_colors(palette.FAULT_BLOCK).reverse
     assert without_colors(palette.ATTENTION_BLOCK).reverse

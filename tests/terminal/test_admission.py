@@ -119,7 +119,7 @@ async def quiet(pilot: Pilot[None], app: Panel) -> None:
     await pilot.pause()
 
 
-async def test_a_key_alone_acts_and_one_of_a_piece_does_not() -> None:
+async def test_single_key_acts_but_a_burst_does_not() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send("r")
@@ -146,7 +146,7 @@ async def test_a_key_at_once_acts_only_while_it_can_do_no_harm() -> None:
         assert app.screen.query_one("#answer", Input).value == ""
 
 
-async def test_each_piece_is_reported_once() -> None:
+async def test_each_burst_is_reported_once() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send(*"rrr", stroke=piece())
@@ -155,7 +155,7 @@ async def test_each_piece_is_reported_once() -> None:
         await until(pilot, lambda: app.not_taken == [3, 2])
 
 
-async def test_a_piece_writes_text_and_moves_its_cursor_but_never_submits() -> None:
+async def test_burst_writes_text_and_moves_the_cursor_but_never_submits() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         field = app.query_one("#text", Input)
@@ -169,7 +169,7 @@ async def test_a_piece_writes_text_and_moves_its_cursor_but_never_submits() -> N
         assert app.done == []
 
 
-async def test_a_widget_says_for_itself_that_it_takes_text() -> None:
+async def test_widget_declares_that_it_accepts_text() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         line = app.query_one(Line)
@@ -179,7 +179,7 @@ async def test_a_widget_says_for_itself_that_it_takes_text() -> None:
         assert line.typed == "30<left>"
 
 
-async def test_an_arrow_of_a_piece_comes_through_and_tells_what_it_is() -> None:
+async def test_arrow_of_a_burst_is_passed_with_its_stroke() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send("up", stroke=piece(steps=True))
@@ -204,7 +204,7 @@ async def test_stop_discards_keys_waiting_after_another() -> None:
         assert app.not_taken == []
 
 
-async def test_a_key_that_comes_after_a_stop_but_was_read_before_it_is_void() -> None:
+async def test_stop_discards_key_read_before_it() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.stops = 3
@@ -214,7 +214,7 @@ async def test_a_key_that_comes_after_a_stop_but_was_read_before_it_is_void() ->
         assert [stroke and stroke.stamp for stroke in app.strokes] == [3]
 
 
-async def test_a_key_that_no_terminal_sent_is_alone_and_of_now() -> None:
+async def test_synthetic_key_is_single_and_current() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.stops = 7
@@ -224,7 +224,7 @@ async def test_a_key_that_no_terminal_sent_is_alone_and_of_now() -> None:
         assert (stroke.alone, stroke.stamp, stroke.piece) == (True, 7, 1)
 
 
-async def test_a_held_key_ends_with_the_key_however_slow_the_app_is() -> None:
+async def test_held_key_ends_on_release_even_in_a_slow_app() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send("s")
@@ -234,7 +234,7 @@ async def test_a_held_key_ends_with_the_key_however_slow_the_app_is() -> None:
         assert app.done == ["slow", "up"]
 
 
-async def test_a_key_that_waited_long_does_no_more_than_one_of_a_piece() -> None:
+async def test_key_delayed_long_is_handled_like_a_burst() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         before = Stroke(time.monotonic() - KEY_TOO_LATE - 0.1, 0)
@@ -248,7 +248,7 @@ async def test_a_key_that_waited_long_does_no_more_than_one_of_a_piece() -> None
         await until(pilot, lambda: app.query_one("#text", Input).value == "r")
 
 
-async def test_a_key_that_waited_for_two_seconds_still_acts() -> None:
+async def test_key_delayed_by_two_seconds_still_acts() -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.send("r", stroke=Stroke(time.monotonic() - 2.0, 0))
@@ -267,9 +267,7 @@ async def test_keys_typed_ahead_reach_the_dialog() -> None:
 @pytest.mark.parametrize(
     ("focus", "value"), [("#text", "run"), ("#number", ""), ("#line", ""), (None, "")]
 )
-async def test_a_paste_goes_into_a_text_and_does_nothing_else(
-    focus: str | None, value: str
-) -> None:
+async def test_paste_goes_into_a_text_only(focus: str | None, value: str) -> None:
     app = Panel()
     async with app.run_test() as pilot:
         app.set_focus(app.query_one(focus) if focus else None)
@@ -295,11 +293,11 @@ async def test_a_paste_goes_into_a_text_and_does_nothing_else(
     ],
     ids=lambda value: type(value).__name__,
 )
-def test_keys_a_field_accepts(widget: Input | Static | None, text: bool, space: bool) -> None:
+def test_field_accepts_its_keys(widget: Input | Static | None, text: bool, space: bool) -> None:
     assert (takes_text(widget), takes_space(widget)) == (text, space)
 
 
-def test_a_text_field_may_say_that_it_takes_no_space() -> None:
+def test_text_field_may_refuse_spaces() -> None:
     class Reference(Input):
         takes_space = False
 

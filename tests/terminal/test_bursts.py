@@ -56,7 +56,7 @@ class Bench:
         return [given.name for given in self.found]
 
 
-def test_a_key_alone_is_held_back_until_that_is_known() -> None:
+def test_single_key_is_held_until_known_as_single() -> None:
     bench = Bench()
     assert bench.read("r") == []
     assert bench.bursts.deadline() == pytest.approx(bench.now + BURST_GAP)
@@ -67,7 +67,7 @@ def test_a_key_alone_is_held_back_until_that_is_known() -> None:
     assert bench.bursts.deadline() is None
 
 
-def test_keys_of_one_read_are_a_piece() -> None:
+def test_keys_of_one_read_are_a_burst() -> None:
     bench = Bench()
     bench.read("r", "enter")
     found = bench.rest()
@@ -78,7 +78,7 @@ def test_keys_of_one_read_are_a_piece() -> None:
 @pytest.mark.parametrize(
     ("gap", "alone"), [(0.001, False), (CLOSE, False), (QUIET, True), (1.0, True)]
 )
-def test_keys_within_50_ms_are_a_piece(gap: float, alone: bool) -> None:
+def test_keys_within_50_ms_are_a_burst(gap: float, alone: bool) -> None:
     bench = Bench()
     bench.read("r")
     bench.read("enter", after=gap)
@@ -86,7 +86,7 @@ def test_keys_within_50_ms_are_a_piece(gap: float, alone: bool) -> None:
     assert [given.stroke.alone for given in bench.found] == [alone, alone]
 
 
-def test_a_chain_of_near_keys_is_one_piece() -> None:
+def test_chain_of_close_keys_is_one_burst() -> None:
     bench = Bench()
     for name in "drive":
         bench.read(name, after=CLOSE)
@@ -95,7 +95,7 @@ def test_a_chain_of_near_keys_is_one_piece() -> None:
     assert not any(given.stroke.alone for given in bench.found)
 
 
-def test_a_stop_voids_what_still_waits_and_is_part_of_the_piece() -> None:
+def test_stop_cancels_waiting_keys_and_is_part_of_the_burst() -> None:
     bench = Bench()
     bench.read("up", "r", "space", "v")
     bench.read("f", after=CLOSE)
@@ -106,7 +106,7 @@ def test_a_stop_voids_what_still_waits_and_is_part_of_the_piece() -> None:
     assert [given.stroke.alone for given in bench.rest()] == [True]
 
 
-def test_a_stop_voids_a_key_whose_time_was_over_but_that_was_not_given_out() -> None:
+def test_stop_cancels_a_due_key_not_yet_delivered() -> None:
     bursts = Bursts()
     bursts.key(pressed("r", 1.0))
     bursts.stop(pressed("space", 1.2))
@@ -114,7 +114,7 @@ def test_a_stop_voids_a_key_whose_time_was_over_but_that_was_not_given_out() -> 
     assert bursts.given(5.0) == []
 
 
-def test_several_arrows_at_once_step_once() -> None:
+def test_simultaneous_arrows_step_once() -> None:
     bench = Bench()
     bench.read("up", "up", "up")
     found = bench.rest()
@@ -124,7 +124,7 @@ def test_several_arrows_at_once_step_once() -> None:
     assert not any(given.stroke.steps for given in bench.rest())
 
 
-def test_an_arrow_held_down_goes_on_at_its_pace_and_ends_with_the_key() -> None:
+def test_held_arrow_repeats_at_its_pace_until_released() -> None:
     bench = Bench()
     bench.read("up")
     assert [given.stroke.alone for given in bench.rest()] == [True]
@@ -140,7 +140,7 @@ def test_an_arrow_held_down_goes_on_at_its_pace_and_ends_with_the_key() -> None:
     assert [given.stroke.alone for given in bench.rest()] == [True]
 
 
-def test_a_slower_repeat_is_keys_alone() -> None:
+def test_slow_repeats_are_single_keys() -> None:
     bench = Bench()
     for _ in range(5):
         bench.read("down", after=0.09)
@@ -148,7 +148,7 @@ def test_a_slower_repeat_is_keys_alone() -> None:
     assert [given.stroke.alone for given in bench.found] == [True] * 5
 
 
-def test_a_letter_held_down_is_a_piece() -> None:
+def test_held_letter_is_a_burst() -> None:
     bench = Bench()
     for _ in range(40):
         bench.read("r", after=0.033)
@@ -166,7 +166,7 @@ def test_arrows_at_an_uneven_pace_step_once() -> None:
     assert sum(given.stroke.steps for given in bench.found) == 1
 
 
-def test_arrows_that_come_faster_than_any_keyboard_step_once() -> None:
+def test_arrows_faster_than_any_keyboard_step_once() -> None:
     bench = Bench()
     for _ in range(300):
         bench.read("up", after=0.001)
@@ -185,7 +185,7 @@ def test_quick_link_steps_once_per_read() -> None:
     assert sum(given.stroke.steps for given in bench.found) == 1 + 3 + 1
 
 
-def test_another_key_ends_a_held_one() -> None:
+def test_other_key_ends_a_held_one() -> None:
     bench = Bench()
     for _ in range(4):
         bench.read("up", after=0.033)
@@ -196,13 +196,13 @@ def test_another_key_ends_a_held_one() -> None:
     assert not any(given.stroke.steps for given in bench.found[4:])
 
 
-def test_a_long_piece_is_not_held_back_to_its_end() -> None:
+def test_long_burst_is_not_held_until_its_end() -> None:
     bench = Bench()
     found = [given for _ in range(20) for given in bench.read("x", after=CLOSE)]
     assert len(found) >= 20 - HELD_LONGEST / CLOSE - 2
 
 
-def test_a_paste_keeps_its_place_and_leaves_no_key_beside_it_alone() -> None:
+def test_paste_keeps_its_order_and_joins_close_keys() -> None:
     bursts = Bursts()
     bursts.key(pressed("slash", 1.0))
     bursts.paste(Paste("text", 1.01))
@@ -212,14 +212,14 @@ def test_a_paste_keeps_its_place_and_leaves_no_key_beside_it_alone() -> None:
     assert not any(given.stroke.alone for given in keys_of(found))
 
 
-def test_a_stop_does_not_void_a_paste() -> None:
+def test_stop_does_not_cancel_a_paste() -> None:
     bursts = Bursts()
     bursts.paste(Paste("text", 1.0))
     bursts.stop(pressed("space", 1.0))
     assert bursts.given(2.0) == [Paste("text", 1.0)]
 
 
-def test_a_key_waits_for_a_sequence_that_began_beside_it() -> None:
+def test_key_waits_for_a_sequence_begun_with_it() -> None:
     bursts = Bursts()
     bursts.key(pressed("r", 1.0))
     assert bursts.given(1.08, pending=1.03) == []
@@ -278,7 +278,7 @@ def _times(reads: Iterable[tuple[list[str], float]]) -> list[tuple[str, float]]:
 
 
 @given(READS)
-def test_published_input_is_complete(reads: list[tuple[list[str], float]]) -> None:
+def test_every_key_read_is_delivered_or_cancelled(reads: list[tuple[list[str], float]]) -> None:
     bench = Bench()
     for names, gap in reads:
         bench.read(*names, after=gap)
@@ -307,9 +307,7 @@ def test_published_input_is_complete(reads: list[tuple[list[str], float]]) -> No
 @given(
     st.lists(st.sampled_from(["r", "v", "enter", "up", "3"]), min_size=2, max_size=30), st.data()
 )
-def test_a_paste_without_brackets_is_one_piece_at_every_cut(
-    names: list[str], data: st.DataObject
-) -> None:
+def test_unbracketed_paste_is_one_burst_at_every_cut(names: list[str], data: st.DataObject) -> None:
     cut = data.draw(st.integers(0, len(names)))
     bench = Bench()
     bench.read(*names[:cut])

@@ -53,14 +53,14 @@ def names(found: Sequence[Token]) -> list[str]:
     return [token.name for token in found if isinstance(token, KeyToken)]
 
 
-def test_a_function_key_in_one_read_is_that_key_or_none() -> None:
+def test_function_key_in_one_read_is_that_key_or_none() -> None:
     for sequence, key in FUNCTION_KEYS:
         found = names(tokens([sequence]))
         assert found == [key] or (key not in STOPS and found == []), (sequence, key)
 
 
 @pytest.mark.parametrize("gap", GAPS)
-def test_a_function_key_in_several_reads_is_that_key_or_none(gap: float) -> None:
+def test_function_key_in_several_reads_is_that_key_or_none(gap: float) -> None:
     for sequence, key in FUNCTION_KEYS:
         for reads in cuts(sequence):
             # an ESC that nothing followed in time is Escape, whatever comes then
@@ -71,7 +71,7 @@ def test_a_function_key_in_several_reads_is_that_key_or_none(gap: float) -> None
 
 @pytest.mark.parametrize("gap", GAPS)
 @pytest.mark.parametrize("report", ["\x1b[12;40R", "\x1b[?2026;2$y", *REPLIES.values()])
-def test_a_report_between_the_halves_of_a_key_is_no_part_of_it(report: str, gap: float) -> None:
+def test_report_between_halves_of_a_key_is_separate(report: str, gap: float) -> None:
     """A multiplexer reports where the cursor is while the other half is still on its way to it."""
     for sequence, key in FUNCTION_KEYS:
         for first, rest in (each for each in cuts(sequence) if len(each) == 2):
@@ -88,7 +88,7 @@ def test_a_report_between_the_halves_of_a_key_is_no_part_of_it(report: str, gap:
 @pytest.mark.parametrize("report", ["\x1b[12;40R", "\x1b[?2026;2$y", "\x1b[?62;22c"])
 @pytest.mark.parametrize("began", ["\x1b[", "\x1bO", "\x1b[2"])
 @pytest.mark.parametrize("late", [True, False])
-def test_reports_keep_no_sequence_waiting(report: str, began: str, late: bool) -> None:
+def test_reports_do_not_keep_a_sequence_waiting(report: str, began: str, late: bool) -> None:
     """Esc and `[` typed one after the other: the panel asks the terminal twice a second."""
     tokenizer, found, now = Tokenizer(), list[Token](), 0.0
     pieces = [began[0], began[1:]] if late else [began]
@@ -118,7 +118,7 @@ def test_other_keys_of_the_dialects_type_nothing_and_stop_nothing(dialect: str, 
 
 @pytest.mark.parametrize("sequence", REPORTS.values(), ids=REPORTS)
 @pytest.mark.parametrize("gap", GAPS)
-def test_a_report_is_passed_on_and_is_no_key(sequence: str, gap: float) -> None:
+def test_report_is_passed_on_and_is_not_a_key(sequence: str, gap: float) -> None:
     for reads in cuts(sequence):
         found = [token for token in tokens(reads, gap) if token != _escape(token)]
         assert found == [Report(sequence)], reads
@@ -129,13 +129,13 @@ def _escape(token: Token) -> Token | None:
 
 
 @pytest.mark.parametrize("sequence", REPLIES.values(), ids=REPLIES)
-def test_other_replies_are_neither_keys_nor_passed_on(sequence: str) -> None:
+def test_other_replies_are_dropped(sequence: str) -> None:
     for reads in cuts(sequence):
         for gap in (0.0, 0.02):
             assert tokens(reads, gap) == [], (reads, gap)
 
 
-def test_without_mouse_esc_bracket_m_is_complete_and_takes_no_space_with_it() -> None:
+def test_esc_bracket_m_without_mouse_is_complete_without_a_space() -> None:
     assert names(tokens(["\x1b[M   "])) == ["f1", "space", "space", "space"]
     assert tokens(["\x1b[M !!"], mouse=True) == [Report("\x1b[M !!")]
     assert tokens(["\x1b[<0;3;4M"], mouse=True) == [Report("\x1b[<0;3;4M")]
@@ -146,13 +146,13 @@ def test_without_mouse_esc_bracket_m_is_complete_and_takes_no_space_with_it() ->
     "begin", ["\x1b", "\x1b[", "\x1b[2", "\x1bO", "\x1b[[", "\x1b\x1b[", "\x9b"]
 )
 @pytest.mark.parametrize("gap", GAPS)
-def test_a_space_stops_inside_of_any_sequence(begin: str, gap: float) -> None:
+def test_space_stops_inside_any_sequence(begin: str, gap: float) -> None:
     assert names(tokens([begin, " "], gap))[-1:] == ["space"]
     assert names(tokens([begin + " "]))[-1:] == ["space"]
 
 
 @pytest.mark.parametrize("begin", ["\x1b[200~text", "\x1b]11;rgb:", "\x1bP>|"])
-def test_no_stop_key_is_lost_where_an_end_was_lost(begin: str) -> None:
+def test_stop_key_is_not_lost_with_a_missing_terminator(begin: str) -> None:
     for key in (" ", "\x1b[24~", "\x1bO[", "\x1b[U"):
         found = tokens([begin, key], BURST_GAP + 0.01)
         assert next(t.name for t in found if isinstance(t, KeyToken)) in STOPS | {"space"}, key
@@ -209,13 +209,13 @@ def test_reply_that_loses_its_backslash_gives_no_alt_key() -> None:
     assert names(tokens(["\x1b]11;rgb:0/1\x1b\x1b[A"])) == ["alt+up"]  # nothing moves by it
 
 
-def test_a_reply_without_end_gives_its_space_late() -> None:
+def test_unterminated_reply_releases_its_space_late() -> None:
     assert names(tokens(["\x1b]11; r"])) == ["space"]
     assert names(tokens(["\x1b]11;" + " r" * 3000]))[0] == "space"
 
 
 @pytest.mark.parametrize("rest", ["[", "[2", "[24", "[1;5", "O", "[200"])
-def test_bytes_after_a_lone_escape_are_no_key_until_the_final(rest: str) -> None:
+def test_bytes_after_a_lone_escape_are_no_keys_until_the_final_byte(rest: str) -> None:
     for after in (0.1, 0.5, 0.95):
         tokenizer = Tokenizer()
         assert tokenizer.feed("\x1b", 0.0) == []
@@ -225,7 +225,7 @@ def test_bytes_after_a_lone_escape_are_no_key_until_the_final(rest: str) -> None
         assert names(tokenizer.feed("r", ESCAPE_DELAY + after + 0.5)) == ["r"]
 
 
-def test_a_bracket_long_after_escape_is_a_key() -> None:
+def test_bracket_long_after_escape_is_a_key() -> None:
     tokenizer = Tokenizer()
     tokenizer.feed("\x1b", 0.0)
     assert names(tokenizer.tick(ESCAPE_DELAY)) == ["escape"]
@@ -233,7 +233,7 @@ def test_a_bracket_long_after_escape_is_a_key() -> None:
     assert names(tokenizer.feed("[", late)) == ["left_square_bracket"]
 
 
-def test_escape_alone_comes_after_its_delay_with_the_time_it_was_read() -> None:
+def test_lone_escape_is_delivered_late_with_its_read_time() -> None:
     tokenizer = Tokenizer(escape_delay=0.2)
     tokenizer.feed("\x1b", 5.0, "then")
     assert tokenizer.deadline == pytest.approx(5.2)
@@ -242,7 +242,7 @@ def test_escape_alone_comes_after_its_delay_with_the_time_it_was_read() -> None:
     assert tokenizer.tick(5.21) == [KeyToken("escape", "\x1b", 5.0, 5.0, "then")]
 
 
-def test_a_cut_key_tells_when_it_began_and_when_it_was_complete() -> None:
+def test_split_key_has_its_begin_and_end_times() -> None:
     tokenizer = Tokenizer()
     tokenizer.feed("\x1b[", 1.0, "first")
     assert tokenizer.feed("A", 1.5, "second") == [KeyToken("up", None, 1.0, 1.5, "first")]
@@ -295,7 +295,7 @@ OTHER_HERE = {
 }
 
 
-def test_every_other_key_has_the_name_it_has_in_textual() -> None:
+def test_every_other_key_has_its_textual_name() -> None:
     parser, compared = XTermParser(), 0
     for sequence, value in TEXTUALS_OWN.items():
         theirs = [(k.key, k.character) for k in parser._sequence_to_key_events(sequence)]
@@ -351,11 +351,11 @@ def test_every_other_key_has_the_name_it_has_in_textual() -> None:
         (" ", "space"),
     ],
 )
-def test_the_keys_of_the_panel(sent: str, key: str) -> None:
+def test_panel_keys_are_recognized(sent: str, key: str) -> None:
     assert names(tokens([sent])) == [key]
 
 
-def test_a_lock_that_is_on_changes_no_key() -> None:
+def test_lock_keys_change_no_key() -> None:
     for sent in ("\x1b[114;65u", "\x1b[114;129u", "\x1b[114;193:1;114u"):
         (found,) = tokens([sent])
         assert isinstance(found, KeyToken)
@@ -363,12 +363,12 @@ def test_a_lock_that_is_on_changes_no_key() -> None:
 
 
 @pytest.mark.parametrize("sent", ["\x1b[114;1:3u", "\x1b[24;1:3~", "\x1b[9999999u", "\x1b[55296u"])
-def test_a_key_that_is_let_go_or_that_does_not_exist_is_none(sent: str) -> None:
+def test_released_or_unknown_key_is_ignored(sent: str) -> None:
     assert tokens([sent]) == []
 
 
 @given(st.text(max_size=40).filter(lambda text: "\x1b" not in text), st.floats(0, 0.9))
-def test_a_paste_is_one_token_wherever_it_is_cut(text: str, gap: float) -> None:
+def test_paste_is_one_token_wherever_it_is_cut(text: str, gap: float) -> None:
     expected = text.replace("\x00", "").encode(errors="replace").decode()
     for reads in cuts(f"\x1b[200~{text}\x1b[201~", 1):
         if gap >= ESCAPE_DELAY and reads[0] == "\x1b":
@@ -379,7 +379,7 @@ def test_a_paste_is_one_token_wherever_it_is_cut(text: str, gap: float) -> None:
 
 
 @pytest.mark.parametrize("end", ["", *("\x1b[201~"[:n] for n in range(1, 6))])
-def test_a_paste_without_end_ends_after_a_while_and_types_nothing_of_its_end(end: str) -> None:
+def test_unterminated_paste_ends_after_a_while_without_typing(end: str) -> None:
     tokenizer = Tokenizer()
     assert tokenizer.feed(f"\x1b[200~some text{end}", 0.0) == []
     assert tokenizer.tick(SEQUENCE_WITHIN - 0.01) == []
@@ -419,7 +419,7 @@ def test_no_sequence_gives_a_key_that_acts(sequence: str, gap: float, data: st.D
 
 
 @given(st.lists(st.tuples(st.binary(max_size=30), st.floats(0, 2)), max_size=8), st.booleans())
-def test_random_bytes_never_crash_and_always_come_to_an_end(
+def test_random_bytes_never_crash_and_always_end(
     reads: list[tuple[bytes, float]], mouse: bool
 ) -> None:
     tokenizer, now, found = Tokenizer(mouse=mouse), 0.0, list[Token]()
@@ -436,7 +436,7 @@ def test_random_bytes_never_crash_and_always_come_to_an_end(
 
 
 @given(st.text(TYPED + " \r\t\x1b[O", max_size=30), st.sampled_from(GAPS), st.data())
-def test_a_space_is_never_lost(text: str, gap: float, data: st.DataObject) -> None:
+def test_space_is_never_lost(text: str, gap: float, data: st.DataObject) -> None:
     cut = data.draw(st.integers(0, len(text)))
     found = tokens([text[:cut], text[cut:]], gap)
     spaces = [token for token in found if isinstance(token, KeyToken) and token.name == "space"]

@@ -78,7 +78,7 @@ def made(app: Stops, **settings: Any) -> Any:
 QUERIES = ["\x1b[?25l", "\x1b[?1004h", "\x1b[>25u", "\x1b]22;text\x07", "\x1b[1;1Htext", "\x1b[<u"]
 
 
-def test_without_mouse_less_is_requested_of_the_terminal() -> None:
+def test_fewer_modes_are_requested_without_mouse() -> None:
     driver = made(Stops())
     for data in QUERIES:
         driver.write(data)
@@ -86,7 +86,7 @@ def test_without_mouse_less_is_requested_of_the_terminal() -> None:
     assert not driver.mouse_enabled
 
 
-def test_with_mouse_all_is_requested_as_textual_does() -> None:
+def test_all_modes_are_requested_with_mouse() -> None:
     driver = made(Stops(mouse=True))
     for data in QUERIES:
         driver.write(data)
@@ -95,7 +95,7 @@ def test_with_mouse_all_is_requested_as_textual_does() -> None:
     assert not made(Stops(mouse=True), mouse=False).mouse_enabled
 
 
-def test_stop_keys_are_read_early_with_textual_reader() -> None:
+def test_stop_keys_are_read_early_with_the_textual_reader() -> None:
     driver = made(stops := Stops())
     for key in ("r", "f12", "space", "f9", "f1"):
         driver.process_message(events.Key(key, None))
@@ -119,7 +119,7 @@ class Late:
 
 
 @pytest.mark.parametrize(("sleeps", "alone"), [(0.03, False), (0.3, False)])
-def test_bytes_that_a_busy_thread_finds_late_are_not_taken_for_late_keys(
+def test_bytes_read_late_by_a_busy_thread_are_not_late_keys(
     sleeps: float, alone: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     late, ends = Late(), os.pipe()
@@ -142,7 +142,7 @@ def test_bytes_that_a_busy_thread_finds_late_are_not_taken_for_late_keys(
     assert [item.stroke.alone for item in found if isinstance(item, Pressed)] == [alone] * 2
 
 
-def test_a_stop_that_falls_between_bytes_and_stamp_voids_them(
+def test_stop_between_read_and_stamp_cancels_the_keys(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stops = Stops()
@@ -160,7 +160,7 @@ def test_a_stop_that_falls_between_bytes_and_stamp_voids_them(
     assert pressed.stroke.stamp != stops.stop_stamp()
 
 
-def test_a_terminal_that_is_gone_ends_the_panel_as_the_system_does(
+def test_lost_terminal_ends_the_panel_with_a_hangup(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """SIGHUP goes to who leads the session alone: under another program nobody ended the panel."""
@@ -182,7 +182,7 @@ def test_a_terminal_that_is_gone_ends_the_panel_as_the_system_does(
     assert sent == [(os.getpid(), signal.SIGHUP)]
 
 
-def test_a_terminal_that_a_shell_has_taken_back_is_not_gone(
+def test_terminal_taken_back_by_a_shell_is_not_lost(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """In the background of a shell every read fails; the panel ended."""

@@ -114,7 +114,7 @@ def test_result_follows_the_first_words() -> None:
     assert app.return_code == FAILED
 
 
-def test_second_error_before_the_terminal_has_taken_all_loses_no_line(
+def test_second_error_before_the_output_is_written_loses_no_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     app = Ending()
@@ -129,7 +129,7 @@ def test_second_error_before_the_terminal_has_taken_all_loses_no_line(
     assert app.return_code == FAILED
 
 
-def test_end_that_does_not_wait_for_the_work_loses_no_line() -> None:
+def test_exit_without_waiting_for_the_work_loses_no_line() -> None:
     app = Ending()
     app.on_end = lambda: threading.Timer(0.2, app.work.may_end.set).start()
     app.run()
@@ -137,7 +137,7 @@ def test_end_that_does_not_wait_for_the_work_loses_no_line() -> None:
 
 
 @pytest.mark.parametrize("error", [RuntimeError("lost"), SystemExit(3), KeyboardInterrupt()])
-def test_error_in_following_the_work_is_reported(error: BaseException) -> None:
+def test_error_while_following_the_work_is_reported(error: BaseException) -> None:
     app = Ending(error)
     app.run()
     assert app.lines == [SENTENCE, BEGUN, END_NOT_SEEN]

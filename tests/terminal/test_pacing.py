@@ -47,7 +47,7 @@ def drawn(link: Link, sizes: list[int]) -> float:
     return link.free + link.way
 
 
-def test_a_frame_waits_for_the_answer_to_the_one_before() -> None:
+def test_frame_waits_for_the_acknowledgment_of_the_previous() -> None:
     pacing = Pacing()
     assert pacing.room(0.0) == WHOLE
     pacing.sent(100, 0.0)
@@ -56,7 +56,7 @@ def test_a_frame_waits_for_the_answer_to_the_one_before() -> None:
     assert pacing.room(1.1) == WHOLE
 
 
-def test_urgent_output_follows_small_pieces_only() -> None:
+def test_urgent_output_waits_for_small_pieces_only() -> None:
     pacing = Pacing()
     pacing.sent(AHEAD, 0.0)
     assert pacing.room(0.1, hurry=True)
@@ -64,7 +64,7 @@ def test_urgent_output_follows_small_pieces_only() -> None:
     assert not pacing.room(0.2, hurry=True)
 
 
-def test_a_terminal_that_never_answers_gets_a_frame_now_and_then_and_what_hurries_at_once() -> None:
+def test_silent_terminal_gets_rare_frames_and_immediate_urgent_output() -> None:
     pacing = Pacing(slow=True)
     pacing.sent(5000, 0.0)
     assert not pacing.room(MUTE_AFTER - 0.01)
@@ -76,7 +76,7 @@ def test_a_terminal_that_never_answers_gets_a_frame_now_and_then_and_what_hurrie
     assert pacing.room(MUTE_AFTER + 0.1, hurry=True) == WHOLE
 
 
-def test_an_answer_that_is_lost_holds_nothing_up_for_ever() -> None:
+def test_lost_acknowledgment_does_not_block_forever() -> None:
     pacing = Pacing()
     pacing.sent(10, 0.0)
     pacing.answered(0.1)
@@ -89,14 +89,14 @@ def test_an_answer_that_is_lost_holds_nothing_up_for_ever() -> None:
     assert pacing.room(12.1), "the next answer is that of the next frame"
 
 
-def test_answers_that_come_late_are_no_more_than_was_requested() -> None:
+def test_unrequested_acknowledgment_adds_no_room() -> None:
     pacing = Pacing()
     pacing.answered(0.0)
     assert pacing.room(0.0) == WHOLE
 
 
 @pytest.mark.parametrize("rate", [1000.0, 2000.0, 5000.0])
-def test_on_a_slow_link_no_more_than_a_second_is_on_its_way(rate: float) -> None:
+def test_slow_link_has_at_most_one_second_in_flight(rate: float) -> None:
     """Once the link has shown its rate: a key that comes back finds little before its own."""
     link = Link(rate, 0.15, Pacing(slow=True))
     drawn(link, [4000])
@@ -113,13 +113,13 @@ def test_on_a_slow_link_no_more_than_a_second_is_on_its_way(rate: float) -> None
 
 
 @pytest.mark.parametrize(("rate", "way"), [(2000.0, 0.15), (2000.0, 0.3), (20000.0, 0.05)])
-def test_a_whole_picture_comes_nearly_as_fast_as_the_link_can(rate: float, way: float) -> None:
+def test_full_screen_uses_nearly_the_whole_link(rate: float, way: float) -> None:
     link = Link(rate, way, Pacing(slow=True))
     took = drawn(link, [4000])
     assert took < (4000 / rate + 2 * way) * 1.5
 
 
-def test_a_link_that_shows_that_it_is_fast_gets_whole_frames() -> None:
+def test_fast_link_gets_whole_frames() -> None:
     link = Link(1e6, 0.001, Pacing(slow=True))
     drawn(link, [5000] * 6)
     link.until(100.0)

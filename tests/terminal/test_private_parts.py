@@ -489,7 +489,7 @@ PARTS = [
 
 
 @pytest.mark.parametrize("package", VERSIONS)
-def test_the_versions_are_those_that_were_looked_at(package: str) -> None:
+def test_textual_versions_are_those_reviewed(package: str) -> None:
     import tomli
 
     needed = tomli.loads(PROJECT.read_text(encoding="utf-8"))["project"]["dependencies"]
@@ -503,7 +503,7 @@ def test_the_versions_are_those_that_were_looked_at(package: str) -> None:
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
-def test_a_private_part_of_textual_is_what_it_was(part: Part) -> None:
+def test_private_part_of_textual_is_unchanged(part: Part) -> None:
     reported = (
         f"Textual {version('textual')}: {part.name} is not what tui/terminal/{part.used_in}"
         f" needs. Look at {part.look_at}."
@@ -515,7 +515,7 @@ def test_a_private_part_of_textual_is_what_it_was(part: Part) -> None:
     assert still, reported
 
 
-def test_every_private_part_that_is_used_has_a_check_in_the_right_module() -> None:
+def test_every_used_private_part_has_a_check_in_its_module() -> None:
     used = {
         (path.removeprefix(f"{ROOM}/"), use.name)
         for path, use in in_project()
@@ -531,7 +531,7 @@ def test_every_private_part_that_is_used_has_a_check_in_the_right_module() -> No
     assert used == checked - {("driver.py", "_set_pointer_shape")}
 
 
-def test_private_parts_of_textual_are_used_in_one_room_only() -> None:
+def test_private_parts_of_textual_are_used_in_one_package_only() -> None:
     outside = [
         f"tui/{path}:{use.line}: {use.name}"
         for path, use in in_project()
@@ -560,7 +560,7 @@ PLANTED = {
 
 
 @pytest.mark.parametrize("source", PLANTED)
-def test_a_use_of_a_private_part_is_found(source: str) -> None:
+def test_use_of_a_private_part_is_found(source: str) -> None:
     from textual.app import App
 
     from .private_uses import textual_bases
@@ -582,7 +582,7 @@ OWN = [
 
 
 @pytest.mark.parametrize("source", OWN)
-def test_a_private_name_of_ones_own_is_not_taken_for_textuals(source: str) -> None:
+def test_own_private_name_is_not_taken_for_a_textual_one(source: str) -> None:
     from textual.app import App
 
     from .private_uses import textual_bases

@@ -104,14 +104,14 @@ def test_a_key_with_more_in_its_read_waits(data: bytes) -> None:
     assert reader.read(data, 1.0, 0) == []
 
 
-def test_a_stop_in_one_write_with_a_run_leaves_nothing_that_acts() -> None:
+def test_stop_in_one_write_with_a_run_cancels_the_run() -> None:
     for sent in (b"r ", b"r\r ", b"\x1b[A\x1b[Ar ", b"ar ", b"30\r\x1b[24~", b"r \r", b" r\r"):
         taken, keys, _ = read((0.0, sent))
         assert len(taken) == 1, sent
         assert acting(keys, 1) == [], sent
 
 
-def test_a_key_before_a_stop_has_an_older_stamp_and_one_after_it_the_newer() -> None:
+def test_keys_before_and_after_a_stop_have_different_stamps() -> None:
     taken, keys, _ = read((0.0, b"r"), (1.0, b" "), (2.0, b"v"))
     assert taken == ["space"]
     assert [(key.name, key.stroke.stamp, key.stroke.alone) for key in keys] == [
@@ -120,7 +120,7 @@ def test_a_key_before_a_stop_has_an_older_stamp_and_one_after_it_the_newer() -> 
     ]
 
 
-def test_a_sequence_that_a_stop_falls_into_has_the_older_stamp() -> None:
+def test_sequence_interrupted_by_a_stop_has_the_older_stamp() -> None:
     stops = Stops()
     reader = KeyReader(stops)
     reader.read(b"\x1b[", 1.0, stops.stop_stamp())
@@ -130,19 +130,19 @@ def test_a_sequence_that_a_stop_falls_into_has_the_older_stamp() -> None:
     assert (key.name, key.stroke.stamp, key.stroke.read_at) == ("up", 0, 1.0)
 
 
-def test_a_space_in_a_text_is_text() -> None:
+def test_space_in_a_text_is_text() -> None:
     taken, keys, _ = read((0.0, b"a b"), typing=True)
     assert taken == []
     assert [key.character for key in keys] == ["a", " ", "b"]
 
 
-def test_keys_of_a_piece_know_how_many_they_are() -> None:
+def test_keys_of_a_burst_have_its_size() -> None:
     _, keys, _ = read((0.0, b"bar"))
     assert [(key.stroke.piece, key.stroke.acts) for key in keys] == [(3, False)] * 3
 
 
 @pytest.mark.parametrize("output", [*REPORTS.values(), *REPLIES.values()])
-def test_terminal_reports_are_no_part_of_a_piece(output: str) -> None:
+def test_terminal_reports_are_not_part_of_a_burst(output: str) -> None:
     for cut in range(len(output) + 1):
         first, second = output[:cut].encode(), output[cut:].encode()
         taken, keys, found = read((1.0, b"r" + first), (1.02, second))
@@ -151,13 +151,13 @@ def test_terminal_reports_are_no_part_of_a_piece(output: str) -> None:
         assert [paste for paste in found if not isinstance(paste, Pressed | Report)] == []
 
 
-def test_a_key_near_an_escape_is_not_alone() -> None:
+def test_key_close_to_an_escape_is_not_single() -> None:
     _, keys, _ = read((1.0, b"r"), (1.03, b"\x1b"))
     assert [(key.name, key.stroke.acts) for key in keys] == [("r", False), ("escape", False)]
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_f12_and_f9_are_taken_at_once_in_every_dialect(dialect: str) -> None:
+def test_f12_and_f9_act_immediately_in_every_dialect(dialect: str) -> None:
     for number, key in ((12, "f12"), (9, "f9")):
         sent = DIALECTS[dialect][number - 1].encode()
         taken, keys, _ = read((0.0, b"r" + sent + b"v"))
@@ -166,7 +166,7 @@ def test_f12_and_f9_are_taken_at_once_in_every_dialect(dialect: str) -> None:
 
 
 @pytest.mark.parametrize("code", [b"\x9b", b"\x8f"])
-def test_bytes_that_are_no_text_may_begin_a_sequence_and_are_never_a_key(code: bytes) -> None:
+def test_non_text_bytes_may_begin_a_sequence_but_are_never_keys(code: bytes) -> None:
     assert read((0.0, code + b"24~"))[0] == (["f12"] if code == b"\x9b" else [])
     for byte in (b"\xff", b"\xe9", b"\xc3", b"\x80"):
         taken, keys, _ = read((0.0, byte), (1.0, b" "), (2.0, b"\xc3"), (2.01, b"\xa9"))
@@ -174,13 +174,13 @@ def test_bytes_that_are_no_text_may_begin_a_sequence_and_are_never_a_key(code: b
         assert [key.name for key in keys] == ["é"]
 
 
-def test_a_paste_stops_nothing_and_is_text() -> None:
+def test_paste_is_text_and_stops_nothing() -> None:
     taken, keys, found = read((0.0, b"\x1b[200~a b\xff\nrun \x1b[201~"))
     assert (taken, keys) == ([], [])
     assert [paste.text for paste in found if isinstance(paste, Paste)] == ["a b?\nrun "]
 
 
-def test_a_paste_of_random_keys_without_brackets_only_stops() -> None:
+def test_unbracketed_paste_of_random_keys_only_stops() -> None:
     chance = random.Random(12)
     typed = [bytes([code]) for code in range(32, 127)] + [b"\r", b"\t", b"\x7f"]
     typed += [b"\x1b[A", b"\x1bOP", b"\x1b[24~", b"\x1b"]
@@ -208,13 +208,13 @@ def test_random_bytes_never_crash(reads: list[tuple[float, bytes]], typing: bool
 
 @pytest.mark.parametrize("keys", [b"\x1b ", b"ab\r ", b"ab\t ", b"\x1bOP ", b"\x1b[5~ "])
 @pytest.mark.parametrize("cut", [None, 1, -1])
-def test_space_behind_a_key_that_may_leave_a_text_is_none(keys: bytes, cut: int | None) -> None:
+def test_space_after_a_key_that_may_leave_a_text_is_not_text(keys: bytes, cut: int | None) -> None:
     reads = [(1.0, keys)] if cut is None else [(1.0, keys[:cut]), (1.02, keys[cut:])]
     assert read(*reads, typing=True)[0] == ["space"]
 
 
 @pytest.mark.parametrize("keys", [b"ab ", b"a\x7f ", b"ab\x1b[D ", b"\xc3\xa9 "])
-def test_space_behind_what_edits_a_text_is_text(keys: bytes) -> None:
+def test_space_after_an_editing_key_is_text(keys: bytes) -> None:
     stops, pressed, _ = read((1.0, keys), typing=True)
     assert stops == []
     assert pressed[-1].name == "space"
@@ -222,7 +222,7 @@ def test_space_behind_what_edits_a_text_is_text(keys: bytes) -> None:
 
 @pytest.mark.parametrize("data", [b" ", b"\x1b[24~", b"\x1b[20~"])
 @pytest.mark.parametrize("broken", ["Tokenizer.feed", "Bursts.stop", "KeyReader._sorted"])
-def test_keys_that_cannot_be_read_stop_every_drive_if_one_may_be_a_stop(
+def test_unreadable_keys_stop_every_drive_if_one_may_be_a_stop(
     monkeypatch: pytest.MonkeyPatch, data: bytes, broken: str
 ) -> None:
     def failing(*_: object) -> None:
