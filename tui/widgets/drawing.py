@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Callable, Collection, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import lru_cache
 
 from rich.style import Style
 from rich.text import Text
@@ -53,6 +55,58 @@ def cut_at_word(text: str, width: int) -> str:
         return text
     at = text.rfind(" ", 0, width)
     return f"{text[: at if at > width // 2 else width - 1].rstrip(' ,;:')}…"
+
+
+ARTICLES = frozenset(("a", "an", "the"))
+"""Words that a name loses first if it is too long."""
+
+
+@lru_cache(maxsize=64)
+def fitted_names(names: tuple[str, ...], width: int) -> Mapping[str, str]:
+    """Return the names of one list, each in at most so many cells, no two of them alike.
+
+    A longer name loses its articles, then a part of its middle. What is left of it begins and
+    ends like no other name, if possible.
+    """
+    fitted = {name: plain(name) for name in names if len(plain(name)) <= width}
+    taken = set(fitted.values())
+    longer = {name: _without_articles(plain(name)) for name in names if name not in fitted}
+    others = sorted((*taken, *longer.values()))
+    for name, text in longer.items():
+        forms = [text] if len(text) <= width else _without_middle(text, width)
+        free = [form for form in forms if form not in taken]
+        own = (form for form in free if _is_own(form, others))
+        fitted[name] = next(own, free[0] if free else forms[0])
+        taken.add(fitted[name])
+    return fitted
+
+
+def _without_articles(text: str) -> str:
+    return " ".join(word for word in text.split(" ") if word not in ARTICLES)
+
+
+def _is_own(form: str, names: Sequence[str]) -> bool:
+    """Return True if one of the sorted names begins and ends like a shortened one, no more."""
+    head, _, tail = form.partition("…")
+    first, last = bisect_left(names, head), bisect_right(names, f"{head}\U0010ffff")
+    return sum(name.endswith(tail) for name in names[first:last]) <= 1
+
+
+def _without_middle(text: str, width: int) -> list[str]:
+    """Return the ways to shorten a text to so many cells by a part in its middle, the best first.
+
+    A cut between words is better, and one in the middle of the width.
+    """
+    if len(text) <= width:
+        return [text]
+    found = []
+    for head in range(1, width - 1):
+        for tail in range(max(1, width - head - 4), width - head):
+            if text[head - 1] == " " or text[-tail] == " ":
+                continue
+            cuts = (text[head] != " ") + (text[-tail - 1] != " ")
+            found.append((3 * cuts + (width - head - tail) + abs(head - tail) / 4, head, tail))
+    return [f"{text[:head]}…{text[-tail:]}" for _, head, tail in sorted(found)] or [text[:width]]
 
 
 def wrapped(text: str, width: int, most: int) -> list[str]:

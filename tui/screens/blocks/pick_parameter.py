@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
+from textual.events import Resize
 from textual.widgets import Input, OptionList
 
 from tui.drive.blocks.picking import choices
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
-from tui.widgets.drawing import cut
+from tui.widgets.drawing import fitted_names
 from tui.widgets.fields import JOINS_KEY, FilterField
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
@@ -22,7 +24,10 @@ from ..dialogs.question import Question, hint
 
 LISTED_MOST = 100
 """Parameters that are listed at once; a search brings the others."""
-NAME_WIDTH = 30
+WIDEST = 92
+"""Cells of the dialog at most: the longest names fit."""
+BESIDE_NAME, AROUND = 29, 6
+"""Cells of a line without its name, and of the dialog around a line."""
 PICK_HINT = hint(("Up, Down", "choose"), JOINS_KEY, ("Enter", "propose"), ("Esc", "cancel"))
 
 
@@ -63,7 +68,7 @@ class PickParameter(Question[str | None]):
         self._found = every[:LISTED_MOST]
         options = self.query_one(OptionList)
         options.clear_options()
-        lines = [self._line(parameter) for parameter in self._found]
+        lines = pick_lines(self._found, min(WIDEST, self.app.size.width) - AROUND)
         unused = [] if search else [Text(" none      the slot is unused", FAINT)]
         options.add_options([entry(line) for line in (*unused, *lines)])
         options.highlighted = 0 if options.option_count else None
@@ -71,13 +76,9 @@ class PickParameter(Question[str | None]):
         text = f"{len(every)} matches{more}" if every else "No match. Delete some letters."
         self.query_one("#count", Plain).update(text)
 
-    def _line(self, parameter: Parameter) -> Text:
-        text = Text(no_wrap=True)
-        sure = is_verified(parameter)
-        text.append(f" {parameter.code + ('' if sure else '?'):<9} ", STRONG if sure else ALARM)
-        text.append(cut(parameter.name, NAME_WIDTH), PLAIN)
-        text.append(f" {parameter.number:<8} 16#{parameter.address:04X}", FAINT)
-        return text
+    def on_resize(self, _: Resize) -> None:
+        """Give the names the new width."""
+        self._list(self.query_one(Input).value)
 
     def action_step(self, step: int) -> None:
         """Another one of the list."""
@@ -102,3 +103,20 @@ class PickParameter(Question[str | None]):
             self.answer("none")
             return
         self.answer(self._found[at if searched else at - 1].code)
+
+
+def pick_lines(parameters: Sequence[Parameter], width: int) -> list[Text]:
+    """Return a line for each parameter; the names have what the other columns leave."""
+    names = tuple(parameter.name for parameter in parameters)
+    room = max(8, min(width - BESIDE_NAME, max(map(len, names), default=0)))
+    fitted = fitted_names(names, room)
+    return [_pick_line(parameter, f"{fitted[parameter.name]:<{room}}") for parameter in parameters]
+
+
+def _pick_line(parameter: Parameter, name: str) -> Text:
+    text = Text(no_wrap=True)
+    sure = is_verified(parameter)
+    text.append(f" {parameter.code + ('' if sure else '?'):<9} ", STRONG if sure else ALARM)
+    text.append(name, PLAIN)
+    text.append(f" {parameter.number:<8} 16#{parameter.address:04X}", FAINT)
+    return text

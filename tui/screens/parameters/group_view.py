@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from rich.text import Text
 
 from tui.drive.settings.selection import Choice
-from tui.widgets.drawing import cut_at_word, short
+from tui.widgets.drawing import fitted_names
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, PLAIN, STRONG
 
 FILTER_LABELS: dict[str, str] = {
@@ -54,20 +54,20 @@ def group_lines(entries: Sequence[GroupEntry], chosen: Choice, width: int, room:
     at = next((n for n, entry in enumerate(rest) if entry.choice == chosen), 0)
     top = min(max(0, at - left // 2), max(0, len(rest) - left))
     shown = rest[top : top + left]
-    lines = [_line(entry, chosen, width) for entry in [*pinned, *shown]]
+    labels = fitted_names(tuple(entry.label for entry in entries), width - 2)
+    lines = [_line(entry, chosen, labels[entry.label], width) for entry in [*pinned, *shown]]
     if (below := len(rest) - top - len(shown)) > 0 and len(shown) > 1:
         lines[-1] = Text(f" … {below + 1} more", FAINT, no_wrap=True)
     return lines[:room]
 
 
-def _line(entry: GroupEntry, chosen: Choice, width: int) -> Text:
+def _line(entry: GroupEntry, chosen: Choice, label: str, width: int) -> Text:
     here = entry.choice == chosen
     group = entry.choice.group or entry.choice.filter == "start-up"
     style = STRONG if here else PLAIN if entry.count or group else FAINT
     if entry.count and not here:
         style = STYLES.get(entry.choice.filter, style)
-    label = entry.label if len(entry.label) < width - 1 else cut_at_word(entry.label, width - 2)
-    text = Text(f" {short(label, width - 2):<{width - 2}} ", style, no_wrap=True)
+    text = Text(f" {label:<{width - 2}} ", style, no_wrap=True)
     if here:
         text.stylize(CURSOR)
     return text

@@ -21,7 +21,7 @@ from tui.screens.parameters.detail_view import (
 from tui.screens.parameters.group_view import FILTER_LABELS, group_lines
 from tui.screens.parameters.parameter_list import shows_steps
 from tui.screens.parameters.start_up_view import step_help
-from tui.screens.parameters.table_view import head_line, row_line
+from tui.screens.parameters.table_view import head_line, layout_of, row_line
 from tui.widgets.fields import JOINS_KEY, FilterField
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, KEY
@@ -92,13 +92,14 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             extra = (limits.low_by, limits.high_by) if limits is not None else ()
             editor.values.visible += tuple(text for text in extra if text)
         columns = self.query_one("#table").size.width
+        layout = layout_of(editor, self.listed.items, columns)
         table = [
-            row_line(editor, item, columns, chosen=place == self.listed.at)
+            row_line(editor, item, layout, columns, chosen=place == self.listed.at)
             for place, item in enumerate(shown, start=self.listed.top)
         ]
         self.put("table", table or [Text(self._empty(), FAINT)])
         other = editor.other_label  # a file keeps its name as it is
-        self.put("columns", [head_line(columns, "Factory" if other == "factory" else other)])
+        self.put("columns", [head_line(layout.columns, "Factory" if other == "factory" else other)])
         self._draw_groups()
         self.put("status", [status_line(editor, self._where(), width)])
         height = TALL if self.size.height >= TALL_FROM else SHORT

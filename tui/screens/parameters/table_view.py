@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from rich.style import Style
 from rich.text import Text
@@ -11,12 +12,18 @@ from rich.text import Text
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Parameter
 from tui.session.settings.editor import Editor
-from tui.widgets.drawing import cut_at_word, short
+from tui.widgets.drawing import fitted_names, short
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, LINE, PLAIN, STRONG, TITLE
 
 from .value_text import is_changed, old_text, other_text, range_text, value_text
 
-LONGEST_NAME = 46
+NAME_CELLS, NAME_ROOM = 46, 30
+"""Cells of a name at most if no name is longer, and those that it needs before limits are shown."""
+WIDTHS = ((150, 14, 9, 30), (90, 11, 8, 21), (0, 9, 0, 0))
+"""From a width of the list on: cells of a value, of the manual's number, and of the limits."""
+ADDRESS = 15
+STAGED_MARK = 3
+"""Cells of the arrow before a staged value."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,39 +35,91 @@ class TableLine:
     text: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Columns:
+class Columns(NamedTuple):
     """Widths of the columns; 0 for one that is not shown."""
 
     name: int
     code: int = 7
     value: int = 9
-    staged: int = 9
-    other: int = 9
+    staged: int = 0
+    other: int = 0
     number: int = 0
     address: int = 0
     range: int = 0
 
-    @classmethod
-    def of(cls, width: int) -> Columns:
-        """Return the columns that fit a list of that width; the least important are dropped
-        first."""
-        if width >= 150:
-            wide = cls(0, value=14, staged=14, other=14, number=9, address=15, range=30)
-        elif width >= 90:
-            wide = cls(0, value=11, staged=10, other=10, number=8, range=21)
-        else:
-            wide = cls(0)
-        return cls(
-            max(8, min(LONGEST_NAME, width - wide.taken)),
-            wide.code, wide.value, wide.staged, wide.other, wide.number, wide.address, wide.range,
-        )  # fmt: skip
-
     @property
     def taken(self) -> int:
-        """The cells of all columns but the name, with the spaces between them."""
-        columns = (self.code, self.value, self.staged, self.other, self.number, self.address)
-        return 1 + sum(columns) + self.range + 3 + 1 + 3
+        """The cells of all columns but the name, with the marks between them."""
+        staged = self.staged + STAGED_MARK if self.staged else 0
+        other = self.other + 1 if self.other else 0
+        return (
+            1
+            + self.code
+            + self.number
+            + self.value
+            + staged
+            + other
+            + 3
+            + self.range
+            + self.address
+        )
+
+
+class Filled(NamedTuple):
+    """The columns of a list that are not empty, and what its names need."""
+
+    staged: bool
+    other: bool
+    range: bool
+    name: int
+    """Cells of the longest name, with a space."""
+
+
+class TableLayout(NamedTuple):
+    """The columns of a list of parameters, and its names as they fit."""
+
+    columns: Columns
+    names: Mapping[str, str]
+
+
+def layout_of(editor: Editor, items: Sequence[TableLine], width: int) -> TableLayout:
+    """Return the columns of a list; an empty one leaves its cells to the names."""
+    profile = editor.session.profile
+    parameters = [profile[item.code] for item in items if item.code]
+    results = editor.staging.results
+    names = tuple(parameter.name for parameter in parameters)
+    filled = Filled(
+        any(p.code in editor.staging.edits or p.code in results for p in parameters),
+        any(other_text(editor, p) for p in parameters),
+        any(range_text(editor, p) for p in parameters),
+        max(map(len, names), default=0) + 1,
+    )
+    columns = fitting_columns(width, filled)
+    return TableLayout(columns, fitted_names(names, columns.name - 1))
+
+
+def fitting_columns(width: int, filled: Filled) -> Columns:
+    """Return the columns that fit a list of that width.
+
+    Limits are omitted if names would have less than `NAME_ROOM` cells, number and address if one
+    would be shortened: the details have them.
+    """
+    value, number, limits = next(row for least, *row in WIDTHS if width >= least)
+    columns = Columns(
+        0,
+        value=value,
+        staged=value if filled.staged else 0,
+        other=value if filled.other else 0,
+    )
+    more = (
+        ("range", limits if filled.range else 0, min(filled.name, NAME_ROOM)),
+        ("number", number, filled.name),
+        ("address", ADDRESS if number == WIDTHS[0][2] else 0, filled.name),
+    )
+    for column, cells, name in more:
+        if columns.taken + cells + max(8, name) <= width:
+            columns = columns._replace(**{column: cells})
+    return columns._replace(name=max(8, min(max(NAME_CELLS, filled.name), width - columns.taken)))
 
 
 def items_of(editor: Editor, codes: Sequence[str], *, headings: bool) -> list[TableLine]:
@@ -76,16 +135,19 @@ def items_of(editor: Editor, codes: Sequence[str], *, headings: bool) -> list[Ta
     return found
 
 
-def head_line(width: int, other: str) -> Text:
+def head_line(columns: Columns, other: str) -> Text:
     """The names of the columns."""
-    columns = Columns.of(width)
     text = Text(" ", no_wrap=True)
     text.append(f"{'Code':<{columns.code}}", TITLE)
     if columns.number:
         text.append(f"{'Number':<{columns.number}}", TITLE)
     text.append(f"{'Name':<{columns.name}}", TITLE)
-    text.append(f"{'Value':>{columns.value}}   {'Staged':>{columns.staged}}", TITLE)
-    text.append(f" {short(other, columns.other):>{columns.other}}   ", TITLE)
+    text.append(f"{'Value':>{columns.value}}", TITLE)
+    if columns.staged:
+        text.append(f"{'Staged':>{columns.staged + STAGED_MARK}}", TITLE)
+    if columns.other:
+        text.append(f" {short(other, columns.other):>{columns.other}}", TITLE)
+    text.append("   ")
     if columns.range:
         text.append(f"{'Limits':<{columns.range}}", TITLE)
     if columns.address:
@@ -93,7 +155,9 @@ def head_line(width: int, other: str) -> Text:
     return text
 
 
-def row_line(editor: Editor, item: TableLine, width: int, *, chosen: bool) -> Text:
+def row_line(
+    editor: Editor, item: TableLine, layout: TableLayout, width: int, *, chosen: bool
+) -> Text:
     """One line of the table."""
     if item.group:
         text = Text(no_wrap=True)
@@ -102,28 +166,32 @@ def row_line(editor: Editor, item: TableLine, width: int, *, chosen: bool) -> Te
         return text
     if not item.code:
         return Text(f"   {item.text}", FAINT, no_wrap=True)
-    text = _row(editor, editor.session.profile[item.code], Columns.of(width))
+    text = _row(editor, editor.session.profile[item.code], layout)
     if chosen:
         text.append(" " * max(0, width - text.cell_len))
         text.stylize(CURSOR)
     return text
 
 
-def _row(editor: Editor, parameter: Parameter, columns: Columns) -> Text:
-    code, text = parameter.code, Text(no_wrap=True)
+def _row(editor: Editor, parameter: Parameter, layout: TableLayout) -> Text:
+    columns, code, text = layout.columns, parameter.code, Text(no_wrap=True)
     sure = is_verified(parameter) or code in editor.marks.confirmed
     text.append("*" if code in editor.marks.favorites else " ", ALARM)
     shown_code = short(code, columns.code - (1 if sure else 2)) + ("" if sure else "?")
     text.append(f"{shown_code:<{columns.code}}", _code_style(parameter, sure))
     if columns.number:
         text.append(f"{short(parameter.number, columns.number - 1):<{columns.number}}", FAINT)
-    name = cut_at_word(parameter.name, columns.name - 1)
+    name = layout.names[parameter.name]
     text.append(f"{name:<{columns.name}}", PLAIN if parameter.access != "r" else FAINT)
     changed = is_changed(editor, parameter)
     held = short(value_text(editor, code), columns.value)
     text.append(f"{held:>{columns.value}}", _value_style(editor, parameter, changed))
-    text.append_text(_staged(editor, code, columns.staged))
-    text.append(f" {short(other_text(editor, parameter), columns.other):>{columns.other}} ", FAINT)
+    if columns.staged:
+        text.append_text(_staged(editor, code, columns.staged))
+    if columns.other:
+        other = short(other_text(editor, parameter), columns.other)
+        text.append(f" {other:>{columns.other}}", FAINT)
+    text.append(" ")
     text.append("■" if changed else " ", ALARM)
     text.append(_kept(editor, code), ALARM)
     if columns.range:
