@@ -6,17 +6,31 @@ from collections.abc import Iterator, Sequence
 
 import pytest
 
+from tui.drive.blocks.picking import choices, raw_of
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.edits import Edit, Edits
-from tui.drive.settings.selection import Choice, FilterId, chosen_codes, rows
-from tui.screens.parameters.parameter_list import FIRST, LAST
+from tui.drive.settings.selection import Choice, FilterId, chosen_codes, group_order, rows
+from tui.screens.blocks.pick_parameter import (
+    AROUND,
+    BESIDE_NAME,
+    LISTED_MOST,
+    WIDEST,
+    pick_lines,
+)
+from tui.screens.blocks.view import table_lines
+from tui.screens.faults.doctor import LABEL, doctor_lines
+from tui.screens.faults.doctor_view import DoctorView
+from tui.screens.faults.view import stored_lines
+from tui.screens.parameters.group_view import group_lines
+from tui.screens.parameters.parameter_list import FIRST, LAST, ParameterList
 from tui.screens.parameters.screen import NARROW, WIDE
 from tui.screens.parameters.table_view import head_line, items_of, layout_of, row_line
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import fitted_names
 
 from . import fakes
+from .test_block_pictures import desk_on, view_of
 from .test_parameter_pictures import still_editor
 
 FAMILIES = [listing.id for listing in library.listings()]
@@ -111,3 +125,84 @@ def test_names_without_room_stay_apart() -> None:
         fitted = fitted_names(names, width)
         assert len(set(fitted.values())) == len(names), width
         assert max(map(len, fitted.values())) <= width
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_groups_of_parameters(family: str) -> None:
+    profile = library.load(family)
+    listed = ParameterList(groups=group_order(profile))
+    entries = listed.entries(editor_of_family(profile).facts)
+    for width in (19, 26):
+        lines = group_lines(entries, entries[0].choice, width, len(entries))
+        assert alike([line.plain.strip() for line in lines]) == [], width
+        assert {line.cell_len for line in lines} == {width}
+    assert [line.plain.strip() for line in lines] == [entry.label for entry in entries]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_pick_list_of_a_slot(family: str) -> None:
+    profile = library.load(family)
+    for block in profile.data.blocks:
+        for search in SEARCHES:
+            parameters = choices(profile, block, search)[:LISTED_MOST]
+            for screen in WIDTHS.values():
+                width = min(WIDEST, screen) - AROUND
+                texts = [line.plain for line in pick_lines(parameters, width)]
+                assert max(map(len, texts), default=0) <= width
+                assert alike([text[11:-17] for text in texts]) == [], (search, screen)
+                longest = max((len(p.name) for p in parameters), default=0)
+                if longest <= width - BESIDE_NAME:
+                    assert [
+                        t[11 : 11 + len(p.name)] for t, p in zip(texts, parameters, strict=True)
+                    ] == [p.name for p in parameters]
+
+
+@pytest.mark.parametrize("family", ["atv21", "atv71"])
+def test_slots_of_a_block(family: str) -> None:
+    block_editor = desk_on(family)
+    profile = block_editor.session.profile
+    for block in block_editor.proposals.blocks:
+        longest = sorted(choices(profile, block), key=lambda p: -len(p.name))[: len(block.slots)]
+        raws = tuple(raw_of(profile, block, parameter) for parameter in longest)
+        raws += (0,) * (len(block.slots) - len(raws))
+        block_editor.views[block.id] = view_of(block_editor.session, block, raws, {})
+        for width in (40, 55, 60, 100):
+            lines = [
+                line.plain for line in table_lines(block_editor, block, width, None, double=True)
+            ]
+            names = [line.split("  ")[-1] for line in lines[2::2] if line.strip()]
+            assert len(names) == len(longest)
+            assert alike(names) == [], width
+            assert max(map(len, lines)) <= width
+        assert names == [parameter.name for parameter in longest]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_history_of_faults(family: str) -> None:
+    profile = library.load(family)
+    faults = profile.data.faults
+    history = [code for code in faults.history if profile.get(code) is not None]
+    known = [fault for fault in faults.codes if fault.raw != faults.none]
+    for start in range(0, len(known), max(1, len(history))):
+        some = known[start : start + len(history)]
+        raws = {code: fault.raw for code, fault in zip(history, some, strict=False)}
+        readings = fakes.readings_of(profile, raws, fakes.NOW)
+        view = DoctorView(profile, None, False, None, readings, fakes.NOW)
+        for width in WIDTHS.values():
+            lines = [line.plain for line in doctor_lines(view, width, 40)]
+            names = [line[LABEL + 5 :].rstrip() for line in lines[-len(some) :]]
+            assert alike(names) == [], width
+            if width >= 80:
+                assert names == [f"{fault.code} {fault.name}" for fault in some]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_values_stored_with_a_fault(family: str) -> None:
+    profile = library.load(family)
+    for codes in filter(None, profile.data.faults.stored):
+        raws = dict.fromkeys(codes, 65535)
+        readings = fakes.readings_of(profile, raws, fakes.NOW)
+        for width in (30, 40, 52):
+            lines = [line.plain for line in stored_lines(profile, codes, readings, width)]
+            assert alike([line[7:] for line in lines]) == [], width
+            assert max(map(len, lines)) <= width

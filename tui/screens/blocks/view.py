@@ -10,18 +10,20 @@ from rich.text import Text
 from tui.drive.blocks.assignment import UNUSED, Assignment, describe, slot_target
 from tui.drive.blocks.user_words import UserWords
 from tui.drive.blocks.wire_cost import Saving, Stretch, block_request, microseconds, together
-from tui.drive.profile.profile import is_verified
+from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.mapping import BlockView, Force, Slot, wire_timing
 from tui.session.read.proof import SlotMatch
-from tui.widgets.drawing import cut, rule, wrapped
+from tui.widgets.drawing import cut, fitted_names, rule, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG
 from tui.wire.frames import hex_text
 
 BOTH = 50
 """Columns of a table from which it also shows the direct value."""
+INDENT = 6
+"""Cells before the second line of a slot."""
 WIDE_SLOTS = 110
 """Columns from which each slot takes two lines."""
 VERDICT_STYLES = {
@@ -50,14 +52,17 @@ def table_lines(
     plan = block_editor.proposals.plans.get(block.id)
     through = "through the block" if block.direction == "read" else "last written"
     right = "proposed" if plan else f"{through} · direct" if width >= BOTH else ""
-    lines = [rule(block.name, width, right)]
-    for place, code in enumerate(block.slots):
-        slot = view.slots[place] if view else Slot(code, None)
-        raw = plan.raws[place] if plan else None
-        lines.append(_slot_line(block_editor, block, slot, raw, width, chosen=place == at))
-        if double:
-            lines.append(_second_line(block_editor, block, slot, raw, width))
-    return lines
+    slots = view.slots if view else [Slot(code, None) for code in block.slots]
+    raws = plan.raws if plan else [None] * len(slots)
+    lines = [
+        _slot_line(block_editor, block, slot, raw, width, chosen=place == at)
+        for place, (slot, raw) in enumerate(zip(slots, raws, strict=True))
+    ]
+    if double:
+        held = [slot.raw if raw is None else raw for slot, raw in zip(slots, raws, strict=True)]
+        below = _second_lines(block_editor.session.profile, block, held, width)
+        lines = [line for pair in zip(lines, below, strict=True) for line in pair]
+    return [rule(block.name, width, right), *lines]
 
 
 def _slot_line(
@@ -113,17 +118,21 @@ def _filled(text: Text, width: int) -> Text:
     return text
 
 
-def _second_line(
-    block_editor: BlockEditor, block: Block, slot: Slot, proposed: int | None, width: int
-) -> Text:
-    """The three notations and the name, dim, under a slot."""
-    raw = slot.raw if proposed is None else proposed
-    parameter = slot_target(block_editor.session.profile, block, raw) if raw else None
-    text = Text("      ", no_wrap=True)
-    if parameter is not None:
-        text.append(f"{notation_text(parameter)}  {parameter.name}", FAINT)
-    text.truncate(width, overflow="ellipsis")
-    return text
+def _second_lines(
+    profile: Profile, block: Block, raws: Sequence[int | None], width: int
+) -> list[Text]:
+    """The three notations and the name, dim, under each slot."""
+    targets = [slot_target(profile, block, raw) if raw else None for raw in raws]
+    known = [parameter for parameter in targets if parameter is not None]
+    longest = max((len(notation_text(parameter)) for parameter in known), default=0)
+    names = fitted_names(tuple(p.name for p in known), max(8, width - INDENT - longest - 2))
+    lines = []
+    for parameter in targets:
+        text = Text(" " * INDENT, no_wrap=True)
+        if parameter is not None:
+            text.append(f"{notation_text(parameter)}  {names[parameter.name]}", FAINT)
+        lines.append(text)
+    return lines
 
 
 def notation_text(parameter: Parameter) -> str:
@@ -153,7 +162,8 @@ def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) 
         first.append(describe(block_editor.session.profile, block, raw), PLAIN)
         return [first, *_remarks(block_editor, view, slot, code, width), *[Text("")] * 3][:4]
     first.append(f"{parameter.code}{'' if is_verified(parameter) else '?'}", STRONG)
-    first.append(f"  {parameter.name}", PLAIN)
+    room = max(8, width - first.cell_len - 2)
+    first.append(f"  {fitted_names((parameter.name,), room)[parameter.name]}", PLAIN)
     second = Text(f" {notation_text(parameter)}", PLAIN)
     second.append(f"   unit {parameter.unit or '-'}", FAINT)
     if raw == slot.raw:

@@ -14,7 +14,7 @@ from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import FaultHelp, Quantity
 from tui.drive.values import NOT_AVAILABLE, Value, set_bits
 from tui.session.shown import Shown
-from tui.widgets.drawing import cut, cut_at_word, wrapped
+from tui.widgets.drawing import cut, cut_at_word, fitted_names, wrapped
 from tui.widgets.palette import (
     ALARM_BLOCK,
     CURSOR,
@@ -276,28 +276,49 @@ def _history(view: DoctorView, width: int, height: int) -> list[Text]:
     if not view.history:
         return _labelled("History", [Text("not known on this drive", FAINT)])
     reported = view.history[: max(_shown_count(view), 1)]
-    rows = [_past(view, number, code, width) for number, code in enumerate(reported)]
+    texts = [_past_text(view, code) for code in reported]
+    stored = [_past_stored(view, number, code) for number, code in enumerate(reported)]
+    kept = STORED_WIDTH if any(stored) else 0
+    room = max(8, width - LABEL - 5 - kept)
+    names = fitted_names(tuple(texts), room)
+    rows = [
+        _past(view, number, f"{names[text]:<{room}}", f"{values:<{kept}}", width)
+        for number, (text, values) in enumerate(zip(texts, stored, strict=True))
+    ]
     chosen = view.at - len(view.look_at)
     top = max(0, min(chosen - height + 1, len(rows) - height)) if chosen >= 0 else 0
     return _labelled("History", rows[top : top + height])
 
 
-def _past(view: DoctorView, number: int, code: str, width: int) -> Text:
-    faults, chosen = view.profile.data.faults, number == view.at - len(view.look_at)
+def _past_fault(view: DoctorView, code: str) -> int | None:
+    """Return the raw code of a past fault; None if it was not read."""
     reading = view.readings.get(code)
-    text = Text(no_wrap=True)
-    text.append(f"{number + 1 if number else 'last':<5}", FAINT)
-    stored = _stored(view, faults.stored[number]) if number < len(faults.stored) else ""
-    room = max(8, width - LABEL - 5 - STORED_WIDTH)
-    if reading is None or reading.raw is None:
-        text.append(cut(NOT_AVAILABLE, room), FAINT)
-    else:
-        known, none = view.profile.fault(reading.raw), reading.raw == faults.none
-        name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
-        text.append(cut(name, room), FAINT if none else PLAIN)
-        stored = "" if none else stored
-    text.append(f"{stored:<{STORED_WIDTH}}", FAINT)
-    if chosen:
+    return None if reading is None else reading.raw
+
+
+def _past_text(view: DoctorView, code: str) -> str:
+    raw = _past_fault(view, code)
+    if raw is None:
+        return NOT_AVAILABLE
+    known = view.profile.fault(raw)
+    return f"{known.code} {known.name}" if known else f"code {raw}"
+
+
+def _past_stored(view: DoctorView, number: int, code: str) -> str:
+    """Return what the drive stored of a past fault; empty if there was no fault."""
+    faults = view.profile.data.faults
+    if number >= len(faults.stored) or _past_fault(view, code) == faults.none:
+        return ""
+    return _stored(view, faults.stored[number])
+
+
+def _past(view: DoctorView, number: int, name: str, stored: str, width: int) -> Text:
+    """One past fault; none is dim."""
+    raw = _past_fault(view, view.history[number])
+    text = Text(f"{number + 1 if number else 'last':<5}", no_wrap=True)
+    text.append(name, FAINT if raw in (None, view.profile.data.faults.none) else PLAIN)
+    text.append(stored, FAINT)
+    if number == view.at - len(view.look_at):
         text.stylize(CURSOR)
     text.truncate(max(1, width - LABEL))
     return text

@@ -8,11 +8,12 @@ from datetime import datetime
 from rich.text import Text
 
 from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment
 from tui.session.shown import Shown
-from tui.widgets.drawing import cut, rule
+from tui.widgets.drawing import fitted_names, rule
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN, STRONG
 
 RECORD_VALUE_WIDTH = 9
@@ -25,25 +26,32 @@ def stored_lines(
     """Return the values that the drive stored at the moment of a fault."""
     if not codes:
         return [Text(" The drive stores nothing of this fault.", FAINT)]
+    known = [profile[code] for code in codes if profile.get(code) is not None]
+    values = [stored_text(readings.get(parameter.code)) for parameter in known]
+    longest = max(map(len, values), default=0)
+    room = max(8, width - longest - 8)
+    names = fitted_names(tuple(map(_stored_name, known)), room)
     return [
-        stored_line(profile, code, readings.get(code), width)
-        for code in codes
-        if profile.get(code) is not None
+        _stored_line(
+            parameter,
+            f"{names[_stored_name(parameter)]:<{room}}",
+            f"{value:>{longest}}",
+            held=(reading := readings.get(parameter.code)) is not None and reading.raw is not None,
+        )
+        for parameter, value in zip(known, values, strict=True)
     ]
 
 
-def stored_line(profile: Profile, code: str, reading: Shown | None, width: int) -> Text:
-    """One stored value; its name without the words that all of them share."""
-    parameter = profile[code]
-    name = parameter.name
-    for tail in (" before the last fault", ", last fault"):
-        name = name.removesuffix(tail)
-    value = stored_text(reading)
-    text = Text(no_wrap=True)
-    room = max(8, width - len(value) - 8)
-    text.append(f" {code:<5} ", FAINT)
-    text.append(cut(name, room), FAINT)
-    text.append(f" {value}", STRONG if reading and reading.raw is not None else FAINT)
+def _stored_name(parameter: Parameter) -> str:
+    """Return a name without the words that all stored values share."""
+    return parameter.name.removesuffix(" before the last fault").removesuffix(", last fault")
+
+
+def _stored_line(parameter: Parameter, name: str, value: str, *, held: bool) -> Text:
+    """One stored value, with its name as it fits."""
+    text = Text(f" {parameter.code:<5} ", FAINT, no_wrap=True)
+    text.append(name, FAINT)
+    text.append(f" {value}", STRONG if held else FAINT)
     return text
 
 

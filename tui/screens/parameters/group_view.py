@@ -21,7 +21,7 @@ FILTER_LABELS: dict[str, str] = {
     "recent": "Recent",
     "settings": "All settings",
     "read-only": "Read only",
-    "unverified": "Unverified",
+    "unverified": "All unverified",
     "all": "Everything",
 }
 """Names of the filters."""
