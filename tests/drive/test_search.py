@@ -98,6 +98,12 @@ def test_names_are_found_by_search_words_either_language() -> None:
     assert found("atv31", "seuil de fréquence")[0] == "Ftd"
 
 
+def test_words_of_a_topic_are_found_without_a_space() -> None:
+    assert found("atv71", "topspeed")[0] == "HSP"
+    assert found("atv71", "top speed") == found("atv71", "speed top")
+    assert found("atv21", "flyingrestart")[0] == "F301"
+
+
 def test_beginning_of_a_word_finds_it_while_it_is_typed() -> None:
     for typed in ("watc", "watchd", "watchdo"):
         assert found("atv71", typed)[0] == "TTO"

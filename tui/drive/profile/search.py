@@ -75,21 +75,28 @@ class ParameterSearch:
         """By phrase, the codes that it finds, with their rank."""
         for code, phrase in self._names.items():
             self._add(phrase, code, 0)
+        joined: set[Phrase] = set()
         for topic in vocabulary.topics:
-            phrases = [self._phrase(text) for text in topic.words]
+            phrases = {self._phrase(text) for text in topic.words}
+            # words are often typed with nothing between them
+            together = {frozenset(("".join(self._typed(text)),)) for text in topic.words}
+            joined |= together - phrases
             for rank, code in enumerate(self._codes(profile, topic)):
-                for phrase in phrases:
+                for phrase in phrases | together:
                     self._add(phrase, code, rank)
         known = {word for phrase in self._ranks for word in phrase}
         self._known = {word: word for word in known} | self._same
         words: dict[str, set[str]] = {p.code: set() for p in profile.parameters}
         for phrase, ranks in self._ranks.items():
-            for code in ranks:
+            for code in ranks if phrase not in joined else ():
                 words[code] |= phrase
         self._entries = {p.code: _entry(profile, p, words[p.code]) for p in profile.parameters}
 
+    def _typed(self, text: str) -> tuple[str, ...]:
+        return search_words(text, self._skipped)
+
     def _phrase(self, text: str) -> Phrase:
-        return frozenset(self._same.get(word, word) for word in search_words(text, self._skipped))
+        return frozenset(self._same.get(word, word) for word in self._typed(text))
 
     def _add(self, phrase: Phrase, code: str, rank: int) -> None:
         ranks = self._ranks.setdefault(phrase, {})

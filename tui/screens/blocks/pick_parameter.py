@@ -77,8 +77,11 @@ class PickParameter(Question[str | None]):
         self.query_one("#count", Plain).update(text)
 
     def on_resize(self, _: Resize) -> None:
-        """Give the names the new width."""
-        self._list(self.query_one(Input).value)
+        """Give the names the new width; the choice stays."""
+        options = self.query_one(OptionList)
+        at = options.highlighted
+        self._list(self.query_one(FilterField).words)
+        options.highlighted = at if at is not None else options.highlighted
 
     def action_step(self, step: int) -> None:
         """Another one of the list."""
