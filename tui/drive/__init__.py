@@ -1,1 +1,1 @@
-"""Model of a drive: profile, parameters, values, words and state chart; no line, no screen."""
+"""Model of a drive: profile, parameters, values, words and state chart. No line, no screen."""

@@ -1,4 +1,4 @@
-"""Commander of a drive and source of its reference, from its channel words."""
+"""Active command and reference channels of a drive, from its channel words."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class Channel:
     parameter: Parameter | None = None
     """The word that shows the channel; if it is unknown, the deciding word that was not read."""
     is_several: bool = False
-    """True if another word decides under other conditions."""
+    """True if another word applies under other conditions."""
 
 
 UNKNOWN_CHANNEL = Channel("", None)

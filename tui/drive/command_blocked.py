@@ -1,4 +1,4 @@
-"""Reasons why a command that can move the motor would have no effect now, and remedies."""
+"""Reasons why a command that can move the motor would have no effect now, with remedies."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .profile.schema import Chart, OrderId
 IN_FAULT = "The drive is in fault: reset it first."
 
 UnblockHint = Literal["", "set-up", "take-control"]
-"""Remedies: none by Drive Panel, another control source, taking control."""
+"""Remedies: empty for none in Drive Panel, another control source, taking control."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +33,10 @@ class CommandBlocked:
 def held_back(
     profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]
 ) -> CommandBlocked | None:
-    """Return the reason against a command, if any; a deciding word that is unknown is a reason."""
+    """Return why a command would have no effect; None if it would.
+
+    A word that the command depends on blocks it while it is unknown.
+    """
     if (lock := locked_by(chart, id, raws)) is not None:
         if lock.parameter not in raws:
             return CommandBlocked(f"{lock.parameter} was not read, and may block this: {lock.text}")

@@ -10,7 +10,7 @@ class ProfileError(DriveError):
 
 
 class UnknownProfile(DriveError):
-    """No profile has the wanted id."""
+    """There is no profile with this id."""
 
 
 class UnknownParameter(DriveError):
@@ -18,7 +18,7 @@ class UnknownParameter(DriveError):
 
 
 class ValueRefused(DriveError):
-    """A typed value cannot be held by the parameter: out of range, unknown name, no number."""
+    """The parameter cannot hold a typed value: out of range, unknown name, or not a number."""
 
 
 class UnitRefused(ValueRefused):

@@ -1,7 +1,7 @@
-"""Family page: facts about the line of a family, in sections.
+"""Facts about a family and its line, in sections.
 
-Warnings first, then waiting, pins, rules, addresses, servers, lamps, commands, and where its
-manuals are wrong. Made from the profile alone.
+Warnings come first, then waiting time, pins, rules, addresses, servers, lamps, commands, and errors
+of its manuals. All facts are from the profile.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ SURENESS: dict[Confidence, str] = {
 HEAD_WIDTH = 18
 """Columns before a text, including an indent of two and a space after it."""
 MARKS, MARK_WIDTH = ("!", "*"), 4
-"""Signs before a text instead of a name, and their columns."""
+"""Marks that replace the name before a text, and their width in columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class PageSection:
 
 @dataclass(frozen=True, slots=True)
 class PageLine:
-    """One line of the page as it is drawn."""
+    """One line of the page as drawn."""
 
     kind: Literal["title", "row", "warning", "gap"]
     head: str

@@ -17,8 +17,8 @@ T = TypeVar("T")
 FACTORY_SHARE = Decimal("0.5")
 """Share of a family's drives assumed to have factory settings, for each setting."""
 SLOW_BELOW = 1200
-"""Baud rates below it are tried last, unless a family leaves the factory so: an address costs
-0.2 s and more there."""
+"""Baud rates below it are tried last, unless they are the factory setting of a family. An address
+takes 0.2 s or more there."""
 IDENTIFY = 43
 PROBE_CHARACTERS = 8
 """Characters of the request that probes an address."""
@@ -74,14 +74,14 @@ class PresenceProbe:
 def wait_for_reply(setting: LineSetting, turnaround: float) -> float:
     """Return the seconds from the end of a request in which a reply must begin.
 
-    A drive answers after its `turnaround`, and not before the silence that ends a frame.
+    A drive answers after its `turnaround`, but not before the inter-frame gap.
     """
     character = character_seconds(setting.baud, setting.format)
     return max(turnaround, silent_seconds(setting.baud, setting.format)) + character
 
 
 def silent_cost(setting: LineSetting, wait: float, probes: int = 1) -> float:
-    """Return the seconds for an unused address: the requests, and the timeout of each."""
+    """Return the seconds that an unused address takes: the requests, and the timeout of each."""
     request = PROBE_CHARACTERS * character_seconds(setting.baud, setting.format)
     return probes * (request + wait)
 
@@ -94,8 +94,9 @@ def longest_turnaround(profiles: Iterable[Profile]) -> float:
 def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[LineSetting]:
     """Return every baud rate and format that a family can have, most promising first.
 
-    Factory settings first; then by how many drives are likely to have it, for the time that it
-    takes to ask an address: at 300 baud one costs as much as thirty at 19 200. Slow ones last.
+    Factory settings come first, then the others by the share of drives that have them, per second
+    that an address takes. At 300 baud an address takes as long as thirty at 19 200. Slow ones come
+    last.
     """
     shares: dict[LineSetting, Decimal] = {}
     for link in links:
@@ -137,7 +138,7 @@ def names_text(names: Sequence[str]) -> str:
 
 
 def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
-    """Return the share of each value: FACTORY_SHARE for the factory's, the rest evenly."""
+    """Return the share of each value: FACTORY_SHARE for the factory setting, the rest evenly."""
     others = [
         type_var_type for type_var_type in dict.fromkeys(all_of_them) if type_var_type != factory
     ]
@@ -148,10 +149,10 @@ def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
 
 
 def presence_probes(profiles: Iterable[Profile]) -> tuple[PresenceProbe, ...]:
-    """Return the fewest requests so that every family answers one, even with a refusal.
+    """Return the fewest requests of which every family answers one, at least with an exception.
 
-    A family without function 43 answers a read of its status word; one that refuses the read of
-    a word it does not have is found by that read as well.
+    A family without function 43 answers a read of its status word. A family that refuses a read of
+    a missing word is also found by such a read.
     """
     registers: dict[int, tuple[str, ...]] = {}
     needs_identification = False

@@ -1,8 +1,8 @@
 """Stop words for a drive whose family is not certain. Pure functions.
 
-A word that stops one family may start another at the same address (what ramps one down in its
-state chart is a run command in the other's): only a word that stops in every chart that the
-drive may have is sent before it has said what it is.
+A word that stops one family may start another: a ramp stop in one state chart is a run command in
+the other. So, before the drive is identified, only a word is sent that stops in every chart that
+the drive may have.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ class FirstWord:
 
 @dataclass(frozen=True, slots=True)
 class StopPlace:
-    """A register that stops families; families that were named come first."""
+    """A register that stops families; families that the user named come first."""
 
     address: int
     families: tuple[StopProfile, ...]
@@ -42,7 +42,7 @@ class StopPlace:
 
     @property
     def deciding(self) -> tuple[int, ...]:
-        """Addresses of further words that decide which word stops them."""
+        """Addresses of further words that select the stop word."""
         codes = (
             code
             for family in self.families
@@ -68,7 +68,7 @@ class StopPlace:
 def stop_places(families: Sequence[StopProfile], named: Sequence[str] = ()) -> list[StopPlace]:
     """Return the stop registers of families: named ones first, then those that ignore a wrong word.
 
-    The others refuse at once a word that they do not have.
+    The others immediately refuse a word that they do not have.
     """
     places: dict[int, list[StopProfile]] = {}
     for profile in families:
@@ -96,9 +96,9 @@ def stop_places(families: Sequence[StopProfile], named: Sequence[str] = ()) -> l
 
 
 def families_beside(families: Sequence[StopProfile], named: str) -> tuple[StopProfile, ...]:
-    """A named family, and those that are stopped by one of its registers.
+    """Return a named family, and those that are stopped by one of its registers.
 
-    No other register may be written to a drive whose family the user has named.
+    If the user has named the family, no other register may be written.
     """
     places = stop_places(families, [named])
     ids = {
@@ -115,9 +115,8 @@ def first_word(
 ) -> FirstWord | None:
     """Return the gentlest word that stops every possible family; None if there is none.
 
-    `raws` are words read from the drive, by address.
-
-    A family that lacks a word which the drive has answered is another, unless it was named.
+    `raws` are words read from the drive, by address. A family without a word that the drive has
+    answered is ruled out, unless the user named it.
     """
     may_be = tuple(
         profile
@@ -144,9 +143,10 @@ def first_word(
 
 
 def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tuple[str, ...]:
-    """Return the families whose own stop is the word that was sent, given the same words.
+    """Return the families whose own stop is the word that was sent, for the same read words.
 
-    By these a drive that does not say what it is may be stopped on: another's word may start it.
+    An unidentified drive may be stopped further only by these: the word of another family may start
+    it.
     """
     found = []
     for family in what.families:
@@ -159,7 +159,7 @@ def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tupl
 def blind_stops(families: Sequence[StopProfile]) -> list[FirstWord]:
     """Return the words that stop a drive of any of these families in any chart, one per register.
 
-    Nothing needs to be known of the drive. Empty if no word stops them all.
+    Nothing has to be read for them. Empty if no word stops all families.
     """
     named = [family.id for family in families]
     found = [first_word(place, {}, "stop", named) for place in stop_places(families, named)]
@@ -167,7 +167,7 @@ def blind_stops(families: Sequence[StopProfile]) -> list[FirstWord]:
 
 
 def _stopped_by(family: StopProfile, address: int, word: int, raws: Mapping[int, int]) -> bool:
-    """Return True if a word stops a family in every chart that may be in force."""
+    """Return True if a word stops a family in every chart that may be active."""
     known = _known(family, raws)
     charts = _charts(family, known)
     return bool(charts) and all(
@@ -182,9 +182,10 @@ def _stopped_by(family: StopProfile, address: int, word: int, raws: Mapping[int,
 
 
 def _charts(family: StopProfile, known: Mapping[str, int]) -> list[Chart]:
-    """The charts that may be in force; one of which no commands are known only where it surely is.
+    """Return the charts that may be active.
 
-    There no word is known to stop, so none is sent.
+    A chart without commands is returned only if it is certainly active: no word is known to stop
+    it, so none is sent.
     """
     sure = [chart for chart in family.charts if chart.when is not None and chart.when.holds(known)]
     if sure:
@@ -192,7 +193,7 @@ def _charts(family: StopProfile, known: Mapping[str, int]) -> list[Chart]:
     may = [
         chart for chart in family.charts if chart.when is None or chart.when.holds(known) is None
     ]
-    may = may or list(family.charts)  # a value of no chart decides nothing
+    may = may or list(family.charts)  # a value that belongs to no chart selects none
     return [chart for chart in may if chart.orders]
 
 

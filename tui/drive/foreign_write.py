@@ -1,7 +1,7 @@
-"""Effect of a write by a foreign program on a drive; pure functions of a profile.
+"""Effect of a write by a third-party program on a drive. Pure functions of a profile.
 
-A SCADA knows registers, not their meaning: each word is classified here as a setting, a command, or
-a word that can only stop the motor.
+A SCADA system knows registers, not their meaning. Each word is classified here as a setting, a
+command, or a word that can only stop the motor.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from .settings.writable import cuts_line, is_order, is_setting, never_set
 from .values import check_raw, from_words, is_field, word_count
 
 ALL = "all"
-"""In place of codes: every setting that may be written without being named."""
+"""Instead of codes: every setting that may be written without being named."""
 
 StartDirection = Literal["forward", "reverse"]
 
@@ -34,12 +34,12 @@ class WordKind(Enum):
     COMMAND = "command"
     STOP = "stop"
     UNKNOWN = "unknown"
-    """The profile has no such register, or nothing may write it."""
+    """The profile has no such register, or it must not be written."""
 
 
 @dataclass(frozen=True, slots=True)
 class ExternalWord:
-    """One word of a write, and the parameters at its place."""
+    """One word of a write, and the parameters at its address."""
 
     address: int
     word: int
@@ -83,9 +83,9 @@ def parameters_at(words: Collection[ExternalWord]) -> list[Parameter]:
 
 
 def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirection | None:
-    """Return the direction in which words may start the motor; None if none may.
+    """Return the direction in which words may start the motor; None if they cannot.
 
-    Every command counts but a reference, which starts nothing that no command has enabled.
+    Every command counts, but not a reference: it starts nothing without an enabling command.
     """
     references = {reference.parameter for reference in profile.data.references}
     found = [
@@ -116,9 +116,10 @@ def _ordered(profile: Profile) -> frozenset[str]:
 
 
 def only_stops(profile: Profile, parameter: Parameter, word: int, raws: Mapping[str, int]) -> bool:
-    """Return True if a word stops the motor in every chart that may be in force, and in its state.
+    """Return True if a word stops the motor in every chart and state that may be active.
 
-    A stop of one chart runs the motor in another: what is not known lets no word pass.
+    A stop of one chart runs the motor in another. So the result is False if a value that it depends
+    on is unknown.
     """
     charts = [
         chart
@@ -163,9 +164,9 @@ def _may_stop(profile: Profile, chart: Chart, order: Order, words: Mapping[int, 
 
 
 def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]:
-    """Return the codes that decide whether one of these words only stops; none if none can.
+    """Return the codes that show if one of these words only stops; none if none can.
 
-    As few as possible: a stop waits until they are read.
+    As few as possible, because a stop waits until they are read.
     """
     found = [
         (chart, order)
@@ -191,8 +192,8 @@ def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]
 def setting_refusal(profile: Profile, found: ExternalWord, allowed: Collection[str]) -> str:
     """Return why a setting is not written for a third-party program; empty if it may be.
 
-    `allowed` are codes, or `ALL`: that leaves out what decides who commands the drive, what cuts
-    the line, and what no document confirms. These are written where they are named.
+    `allowed` are codes, or `ALL`. `ALL` excludes settings that select the command source, cut the
+    line, or that no document confirms: these must be named.
     """
     for parameter in found.parameters:
         if parameter.forbidden:
@@ -219,7 +220,8 @@ def _named_only(profile: Profile) -> frozenset[str]:
 
 
 def value_refusal(profile: Profile, parameter: Parameter, words: Mapping[int, int]) -> str:
-    """Return why a value is never written, or only half of it was; empty if it may be written."""
+    """Return why a value is never written, or only half of it was sent; empty if it may be
+    written."""
     own = [parameter.address + offset for offset in range(word_count(parameter))]
     if any(address not in words for address in own):
         return f"{parameter.code} has two words. Write both in one request."

@@ -35,7 +35,8 @@ class ExcludedAdvice:
     text: str
     code: str
     reason: str
-    """`ruled out, BRA Yes`, or `not now, ULN 228.0 V` if the value at the fault is not known."""
+    """Return `ruled out, BRA Yes`, or `not now, ULN 228.0 V` if the value at the fault is
+    unknown."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +64,9 @@ def reset_text(
 ) -> ResetText:
     """Return how a fault is reset; `by` names the key or the command.
 
-    `ready` is what the drive says of it now, None where it says nothing. The drive is believed
-    before what is only recalled. `follows` is the motor's reaction, of `reset_follows`.
+    `ready` is True or False as the drive reports it, None if it does not. That report takes
+    precedence over the help, which is recalled from memory. `follows` is the motor's reaction, from
+    `reset_follows`.
     """
     if ready is not None:
         text = RESET_NOW if ready else RESET_NOT_YET
@@ -95,7 +97,8 @@ def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
 def advice(profile: Profile, hint: Hint, raws: Mapping[str, int], *, latest: bool) -> FaultAdvice:
     """Return the causes and checks of a fault or an alarm, without those that values exclude.
 
-    `latest` is false for a fault that is not the last one: what the drive stored is not of it.
+    `latest` is False for a fault that is not the last one: the values that the drive has stored do
+    not belong to it.
     """
     stored = frozenset(profile.data.faults.stored[0]) if profile.data.faults.stored else frozenset()
     known = raws if latest else {code: raw for code, raw in raws.items() if code not in stored}

@@ -17,7 +17,7 @@ def model_codes(profile: Profile) -> list[str]:
 def model_of(profile: Profile, raws: Mapping[str, int]) -> Model | None:
     """Return the model that raw values show; None if they show no known model.
 
-    Where two models share a code the bit of the class must be known.
+    If two models share a code, the class bit must be known.
     """
     known = profile.data.identification
     code = raws.get(known.model_parameter)

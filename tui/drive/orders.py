@@ -26,7 +26,7 @@ class OrderRefused(DriveError):
 
 
 def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
-    """Return the chart that certainly applies; None if the deciding word is unknown.
+    """Return the chart that is certainly active; None if the word that selects it is unknown.
 
     A value that belongs to no chart counts as unknown.
     """
@@ -35,13 +35,13 @@ def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
 
 
 def chart_codes(profile: Profile) -> list[str]:
-    """Return the codes of the words that decide between charts; none for most families."""
+    """Return the codes of the words that select the chart; none for most families."""
     codes = (chart.when.parameter for chart in profile.data.charts if chart.when)
     return list(dict.fromkeys(codes))
 
 
 def deciding_codes(profile: Profile) -> list[str]:
-    """Return the codes of the words that decide how a command is carried out, and by whom."""
+    """Return the codes of the words that determine how a command is carried out, and its source."""
     codes = chart_codes(profile)
     for chart in profile.data.charts:
         codes += [when.parameter for order in chart.orders for when in order.when]
@@ -86,7 +86,7 @@ def nearest_stop(chart: Chart, id: OrderId) -> OrderId:
 
 
 def stop_conditions(chart: Chart, id: OrderId) -> list[str]:
-    """Return the codes of the words that decide which word stops a chart."""
+    """Return the codes of the words that select the stop word of a chart."""
     same = [order for order in chart.orders if order.id == id]
     codes = [when.parameter for order in same for when in order.when]
     if any(order.states for order in same):
@@ -95,14 +95,14 @@ def stop_conditions(chart: Chart, id: OrderId) -> list[str]:
 
 
 def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order]:
-    """Return the command that stops in every chart that may apply.
+    """Return the command that stops in every chart that may be active.
 
-    On its ramp where one word does that in all of them, else faster, else coasting. Raises
-    OrderRefused where no word stops in all.
+    By ramp if one word does that in all of them, else faster, else coasting. Raises OrderRefused if
+    no word stops in all.
     """
     ordered = [chart for chart in profile.data.charts if chart.orders]
     may_hold = [chart for chart in profile.data.charts if _may_hold(chart, raws)]
-    # a value of no chart decides nothing
+    # a value that belongs to no chart selects none
     charts = [chart for chart in ordered if chart in may_hold] if may_hold else ordered
     for id in GENTLE_FIRST:
         for chart in charts:
@@ -118,7 +118,7 @@ def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order
 
 
 def _may_hold(chart: Chart, raws: Mapping[str, int]) -> bool:
-    """Return True if a chart may be the one in force."""
+    """Return True if a chart may be active."""
     if chart.when is None:
         return True
     return chart.when.holds(raws) is not False
@@ -174,12 +174,12 @@ def _conditions(order: Order) -> str:
 
 
 STOP_ORDERS: frozenset[OrderId] = frozenset({"stop", "quick-stop", "freewheel", "emergency-stop"})
-"""Orders that no interlock and no missing arming ever holds back."""
+"""Orders that neither an interlock nor missing arming ever blocks."""
 MOVING_ORDERS: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking"})
 
 
 def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock | None:
-    """Return the first interlock that blocks a command now, or whose word is not known."""
+    """Return the first interlock that blocks a command now, or whose word is unknown."""
     if id in STOP_ORDERS:
         return None
     for lock in chart.interlocks:
@@ -214,9 +214,9 @@ def interlock_codes(chart: Chart) -> list[str]:
 
 
 def with_options(chart: Chart, order: Order, raws: Mapping[str, int]) -> list[int]:
-    """Return the words of a command; the present option bits of its word are kept.
+    """Return the words of a command, with the present option bits of its word.
 
-    Zeros hand the control back or lock the drive: they stay zeros.
+    Zeros are unchanged, because they return control or lock the drive.
     """
     where = order.parameter or chart.command
     kept = raws.get(where, 0) & optional_bits(chart, where)
@@ -240,7 +240,7 @@ def order_target(profile: Profile, chart: Chart, order: Order) -> Parameter:
 def walk(chart: Chart, source: str, goal: str) -> list[tuple[str, int]]:
     """Return the shortest path through the chart: pairs of next state and command word.
 
-    Without edges and faults. Raises OrderRefused where there is none.
+    Without command edges and fault states. Raises OrderRefused if there is none.
     """
     ways: deque[tuple[str, list[tuple[str, int]]]] = deque([(source, [])])
     seen = {source}

@@ -1,7 +1,7 @@
-"""Sanitizing of text from persons, drives, files and profiles before display.
+"""Replacement of control characters in texts of persons, drives, files and profiles.
 
-A drive's name with an escape sequence in it must neither command the terminal nor hide there: each
-control character is replaced by a picture, one for one, so that the layout by length stays correct.
+An escape sequence in a drive's name must neither control the terminal nor stay invisible. Each
+control character is replaced by one visible character, so that the length stays correct.
 """
 
 from __future__ import annotations

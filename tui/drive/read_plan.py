@@ -1,8 +1,8 @@
 """Planning of the requests that read a set of parameters with the least time on the wire.
 
-Exact for what it considers: every split of the wanted addresses into runs of neighbors that
-the drive allows, with or without one stretch of each indirect block or scanner table whose
-slots are known.
+The result is optimal for these choices: every split of the addresses into reads of adjacent words
+that the drive allows, each with or without one part of an indirect block or scanner table with
+known slots.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from .values import word_count
 REQUEST_CHARACTERS = 8
 """Characters of a function 3 request: address, function, start, count, checksum."""
 REPLY_CHARACTERS = 5
-"""Characters of its reply beside the words: address, function, byte count, checksum."""
+"""Characters of its reply in addition to the words: address, function, byte count, checksum."""
 WRITE_ONE_CHARACTERS = 8
 """Characters of a function 6 request, and of its reply: address, function, register, word,
 checksum; the reply of function 16 has as many."""
 WRITE_MANY_CHARACTERS = 9
-"""Characters of a function 16 request beside the words."""
+"""Characters of a function 16 request in addition to the words."""
 READ_WRITE_CHARACTERS = 13
-"""Characters of a function 23 request beside the words to write."""
+"""Characters of a function 23 request in addition to the written words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +79,7 @@ class ReadRequest:
 
 @dataclass(frozen=True, slots=True)
 class SlotCheck:
-    """A read of slots after their block, and the values that they must have for it to count."""
+    """A read of slots after their block; the block counts only if they have these values."""
 
     request: ReadRequest
     slots: Mapping[str, int]
@@ -109,14 +109,13 @@ def plan_reads(
     slots: Mapping[str, int] | None = None,
     unreadable: Collection[str] = (),
 ) -> ReadPlan:
-    """The cheapest requests for these parameters.
+    """Return the cheapest requests for these parameters.
 
-    `slots` holds the raw values of block and scanner slots that are known to be in force; a
-    block none of whose slots is known is not used. Slots that take effect at once may be
-    changed by anybody at any time: they are read after each use, which the cost includes.
-    `unreadable` names parameters that this drive refused: no run goes over them. Raises
-    DriveError for a parameter that can only be written, UnknownParameter for one that the
-    profile does not have.
+    `slots` are raw values of block and scanner slots that are known to be active; a block without a
+    known slot is not used. Slots that take effect immediately may be changed by others at any time,
+    so they are read after each use, which the time includes. `unreadable` are codes that this drive
+    refused: no read covers them. Raises DriveError for a parameter that can only be written,
+    UnknownParameter for a missing one.
     """
     wanted = {code: profile[code] for code in dict.fromkeys(codes)}
     for parameter in wanted.values():
@@ -165,10 +164,10 @@ class _Stretch:
 
 
 def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iterator[_Stretch]:
-    """Every read of a read block from one known slot to another.
+    """Yield every read of a block from one known slot to another.
 
-    What is not known between them is left out of an indirect block's words; a scanner may end
-    at an unused slot, and is not read over one.
+    Unknown slots in between are skipped in an indirect block. A read of a scanner may end at an
+    unused slot, but not cover one.
     """
     if block.direction != "read":
         return
@@ -222,7 +221,8 @@ def _runs(
     timing: WireTiming,
     unreadable: Collection[str],
 ) -> list[ReadRequest]:
-    """The cheapest split of parameters into runs of neighbors, by dynamic programming."""
+    """Return the cheapest split of parameters into reads of adjacent words, by dynamic
+    programming."""
     wanted = sorted(parameters, key=lambda p: p.address)
     found: list[ReadRequest] = []
     for function in sorted({p.function for p in wanted}):
@@ -252,7 +252,7 @@ def _cheapest(
         choices = []
         for start in reversed(range(end)):
             if start < end - 1 and last - ordered[start].address >= longest:
-                break  # too long, and so is all that begins before
+                break  # too long, as is every read that begins earlier
             if (count := run_length(profile, ordered[start:end], unreadable)) is not None:
                 choices.append((best[start][0] + timing.read(count), start))
         best.append(min(choices))
@@ -282,7 +282,7 @@ def run_length(
     unreadable: Collection[str] = (),
     longest: int | None = None,
 ) -> int | None:
-    """Return the words of a read over this run; None if the drive does not allow it.
+    """Return the number of words of a read over this run; None if the drive does not allow it.
 
     `longest` is the limit of a function other than 3.
     """

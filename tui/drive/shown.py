@@ -1,7 +1,7 @@
 """Conversion between raw values and text: the only one for screen, journal and command line.
 
-Needed are the raw values that the parameter's scale and unit follow, and what the drive lacks:
-where a scale is not known the value is shown raw, never in a unit that it may not have.
+It needs the raw values of the parameters that scale and unit depend on, and the codes that the
+drive lacks. If the scale is unknown, the value is shown raw, never in a possibly wrong unit.
 """
 
 from __future__ import annotations
@@ -45,7 +45,7 @@ def raw_of_text(
 ) -> Conversion:
     """Encode typed text as a raw value; every write uses this, as every read uses `shown`.
 
-    Raises ValueRefused as `encode` does, and where the unit or the sign is not known.
+    Raises ValueRefused as `encode` does, and if the unit or the sign is unknown.
     """
     if parameter.unit_by is not None and (unit := profile.unit(parameter, raws)) != parameter.unit:
         if unit == "raw":

@@ -1,4 +1,4 @@
-"""Bounded reads of files that a person names, or that the panel stores.
+"""Bounded reads of files that a person names, or that Drive Panel stores.
 
 A pipe would block its reader forever, and a device such as /dev/zero would fill the memory.
 """
@@ -11,7 +11,7 @@ import stat
 from pathlib import Path
 
 LONGEST_TEXT = 2_000_000
-"""Bytes of a file that may be a profile, a parameter set, a block file, or one of the panel's."""
+"""Most bytes of a profile, a parameter set, a block file, or a file of Drive Panel."""
 
 
 def open_regular(path: Path) -> int:

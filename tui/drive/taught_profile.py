@@ -29,9 +29,9 @@ def why_not_taught(family: Profile, code: str) -> str:
 
 
 def is_raw(family: Profile, parameter: Parameter) -> bool:
-    """Return True if a parameter is shown raw since no document states its scale.
+    """Return True if a parameter is shown raw because no document states its scale.
 
-    A document may explain it and leave its scale open, as a cover diagram does.
+    A document may describe it without a scale, as a block diagram does.
     """
     measured = parameter.access == "r" and parameter.quantity is None
     measured = measured and (parameter.min, parameter.max, parameter.factory) == (None, None, None)

@@ -1,7 +1,7 @@
-"""Learning the scale of a raw word from the drive's own display. Pure.
+"""Learning of the scale of a raw word from the drive's own display. Pure.
 
-A look is a raw word with the number that the display showed at the same moment. If exactly one of
-a fixed list of scales agrees with every look, that scale is learned.
+A look is a raw word with the number that the display showed at the same moment. If exactly one of a
+fixed list of scales agrees with every look, that scale is learned.
 """
 
 from __future__ import annotations
@@ -107,10 +107,7 @@ class Lesson:
 
 
 def parse_display(text: str, unit: str = "") -> tuple[Decimal, str]:
-    """Parse number and unit as a person typed them: `50.3`, `50,3 Hz`, `-12A`.
-
-    Raises ValueRefused for what is neither.
-    """
+    """Parse number and unit as typed: `50.3`, `50,3 Hz`, `-12A`. Raises ValueRefused if invalid."""
     typed = text.strip().replace("\N{MINUS SIGN}", "-")
     match = _TYPED.fullmatch(typed)
     if match is None:
@@ -139,7 +136,7 @@ def unit_named(text: str) -> str:
 
 
 def scales_that_fit(looks: Sequence[DisplayLook]) -> list[TaughtScale]:
-    """Return every scale of the list that agrees with all looks, with its sign; none for none."""
+    """Return every possible scale that agrees with all looks, with its sign."""
     if not looks or (unit := _unit_of(looks)) is None:
         return []
     reported = any(look.word >= SIGN_FROM for look in looks)

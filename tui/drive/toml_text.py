@@ -1,7 +1,6 @@
 """Parsing of TOML from any source; errors are a sentence with the line.
 
-The parser itself lets Python's own limits through, and takes minutes for some texts that no person
-writes.
+The parser does not catch some errors of Python, and takes minutes for some malicious texts.
 """
 
 from __future__ import annotations
@@ -12,7 +11,7 @@ from typing import Any
 import tomli
 
 DEEPEST = 24
-"""Tables and lists within one another; a profile needs six."""
+"""Most nesting of tables and lists; a profile needs six levels."""
 _PARTS = re.compile(rf"""^[ \t]*\[{{0,2}}(?:[^=\n"'#.\]]*\.){{{DEEPEST}}}""", re.MULTILINE)
 _OPENED = re.compile(rf"(?:[\[{{][ \t\r\n]*(?:[\w-]+[ \t]*=[ \t\r\n]*)?){{{DEEPEST}}}")
 
@@ -29,7 +28,7 @@ def toml_tables(text: str) -> dict[str, Any]:
     except tomli.TOMLDecodeError:
         raise
     except (ValueError, OverflowError, ArithmeticError) as error:
-        # a number or a date that Python cannot hold
+        # a number or a date that Python cannot represent
         raise tomli.TOMLDecodeError(str(error).split(";")[0].rstrip("."), text, 0) from None
     if _is_deep(tables):
         raise _too_deep(text, 0)

@@ -24,7 +24,7 @@ KINDS: tuple[dict[str, str], ...] = (
 def factor_between(typed: str, own: str) -> Decimal | None:
     """Return the factor from the typed unit to the parameter's own; None if their kinds differ.
 
-    Capitals do not count: no two units of one kind differ by them alone.
+    Case is ignored: no two units of one kind differ by it.
     """
     if typed.casefold() == own.casefold():
         return Decimal(1)

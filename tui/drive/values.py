@@ -1,7 +1,7 @@
 """Raw words and engineering values, both ways, without floats; names of raw values.
 
-A typed value is rounded half away from zero to what the drive can hold; a conversion says
-whether it was, and whether that made another value of it.
+A typed value is rounded half away from zero to a value that the drive can hold. A conversion
+reports if it was rounded, and if that changed the value.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from .profile.schema import Bit, Parameter
 from .units import factor_between
 
 LONGEST_NUMBER = 30
-"""Most digits before or after the point of a typed number."""
+"""Most digits before or after the decimal point of a typed number."""
 NOT_AVAILABLE = "-----"
 HALF_A_STEP = Decimal("0.5")
 SPARE_DECIMALS = 1
@@ -46,7 +46,7 @@ class Value:
 
 @dataclass(frozen=True, slots=True)
 class Conversion:
-    """A raw value made from what a person typed, and whether it had to be rounded."""
+    """A raw value made from a typed one, and if it was rounded."""
 
     raw: int
     rounded: bool
@@ -79,8 +79,8 @@ def is_field(parameter: Parameter) -> bool:
 def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[int, ...]:
     """Return the register words for a raw value; raises ValueRefused if it does not fit.
 
-    `held` is the word as the drive has it, needed for a field of a register: the bits that are
-    not its own stay.
+    `held` is the present word of the drive. It is required for a field of a register, because the
+    other bits must be kept.
     """
     low, high = type_range(parameter)
     if not low <= raw <= high:
@@ -99,7 +99,7 @@ def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[i
 
 
 def type_range(parameter: Parameter) -> tuple[int, int]:
-    """Lowest and highest raw value that the parameter's type can hold."""
+    """Return the lowest and highest raw value that the parameter's type can hold."""
     width = 32 if parameter.type.endswith("32") else 16
     if is_field(parameter):
         return 0, parameter.mask
@@ -109,7 +109,7 @@ def type_range(parameter: Parameter) -> tuple[int, int]:
 
 
 def raw_range(parameter: Parameter) -> tuple[int, int]:
-    """Lowest and highest raw value the profile allows, within the type."""
+    """Return the lowest and highest raw value that the profile allows, within the type."""
     low, high = type_range(parameter)
     return (
         low if parameter.min is None else parameter.min,
@@ -128,8 +128,8 @@ def engineering(raw: int, scale: Decimal) -> Decimal:
 def decimals_of(scale: Decimal) -> int:
     """Return the number of decimals to show for a value of this scale.
 
-    Those of the scale itself (0.1, 0.25). A longer scale (60/32767) gets as many as keep two
-    neighboring counts apart, so that a shown value always leads back to its raw value.
+    Those of the scale itself (0.1, 0.25). A longer scale (60/32767) gets as many as distinguish two
+    adjacent counts, so that a shown value always leads back to its raw value.
     """
     own, needed = max(0, -int(scale.as_tuple().exponent)), max(0, -scale.adjusted())
     return own if own <= needed + SPARE_DECIMALS else needed
@@ -140,8 +140,8 @@ def decode(
 ) -> Value:
     """Decode a raw value.
 
-    A name where the raw value has one, the word in hexadecimal for bit words, else the
-    number with the decimals of its scale; without a scale the raw value itself, unit `raw`.
+    The result is its name if it has one, hexadecimal for bit words, else the number with the
+    decimals of its scale. Without a scale, it is the raw value itself with unit `raw`.
     """
     if parameter.bits:
         return Value(raw, None, "", f"16#{raw & 0xFFFF:04X}")

@@ -1,1 +1,1 @@
-"""Indirect blocks and scanners: assignments, their cost on the wire, their file."""
+"""Indirect blocks and scanners: assignments, their time on the wire, their file."""

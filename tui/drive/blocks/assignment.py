@@ -64,7 +64,7 @@ class SlotChange:
 
 
 def has_blocks(profile: Profile) -> bool:
-    """Return True if the family has an indirect block or a communication scanner at all."""
+    """Return True if the family has an indirect block or a communication scanner."""
     return bool(profile.data.blocks)
 
 
@@ -130,8 +130,8 @@ def slot_changes(before: Mapping[str, int], after: Assignment) -> list[SlotChang
 def steps(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
     """Return the writes that lead from one assignment to another, one slot at a time.
 
-    A slot whose content goes to another slot is set to 0 first: at no moment do two slots
-    stand for the same parameter, so an output is never taken from two places.
+    A slot whose content goes to another slot is cleared first. So two slots never select the same
+    parameter, and an output is never written from two places.
     """
     found = slot_changes(before, after)
     wanted = {change.new for change in found} - {UNUSED}
@@ -160,5 +160,5 @@ def describe(profile: Profile, block: Block, raw: int | None) -> str:
 
 
 def slots_of(plans: Sequence[Assignment]) -> dict[str, int]:
-    """Return the raw values by slot of several blocks together."""
+    """Return the raw values by slot of several blocks."""
     return {slot: raw for plan in plans for slot, raw in plan.slots.items()}

@@ -1,4 +1,4 @@
-"""Assignments as text: TOML, one line a slot, made to be read, compared and edited by hand."""
+"""Assignments as text: TOML, one line per slot, to be read, compared and edited by hand."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _KEY = re.compile(r"\s*(?:\"([^\"]*)\"|'([^']*)'|([A-Za-z0-9_-]+))\s*=")
 
 
 def dump_blocks(profile: Profile, plans: Sequence[Assignment], note: str = "") -> str:
-    """The text of a file with these assignments; `note` is put into its first lines."""
+    """Return the text of a file with these assignments; `note` is put into its first lines."""
     lines = [f"# {plain(line)}" for line in note.splitlines()]
     lines += [f"[{HEAD}]", f"format = {BLOCK_FILE_FORMAT}", f"profile = {json.dumps(profile.id)}"]
     for plan in plans:
@@ -37,10 +37,10 @@ def dump_blocks(profile: Profile, plans: Sequence[Assignment], note: str = "") -
 
 
 def load_blocks(text: str, file: str, profile: Profile) -> dict[str, Assignment]:
-    """The assignments in a text, by the id of their block.
+    """Return the assignments in a text, by the id of their block.
 
-    Raises MappingError with file and line for what is cut short, of another family, no slot of
-    it, or nothing that the slot can stand for.
+    Raises MappingError, with file and line, if the text is cut short, is of another family, or has
+    an invalid slot or value.
     """
     try:
         tables = toml_tables(text)
@@ -99,7 +99,8 @@ def _assignment(
 
 
 def _raw(profile: Profile, block: Block, value: object) -> int:
-    """A slot's raw value: a text names a parameter, a number is the raw value itself."""
+    """Return the raw value of a slot: a text names a parameter, a number is the raw value
+    itself."""
     if isinstance(value, str):
         return raw_named(profile, block, value)
     if isinstance(value, bool) or not isinstance(value, int):
@@ -141,7 +142,7 @@ def _check_end(
     lines: Mapping[tuple[str, str], int],
     count: int,
 ) -> None:
-    """Raise MappingError unless the end states the number of slots that are there."""
+    """Raise MappingError unless the end states the number of slots in the file."""
     end = tables.get(END_OF_BLOCKS)
     if not isinstance(end, dict):
         last = text.count("\n") + 1
@@ -167,7 +168,7 @@ def _fault(
 
 
 def _lines(text: str) -> dict[tuple[str, str], int]:
-    """Line numbers by table and key; a table's own line under an empty key."""
+    """Return line numbers by table and key; a table's own line has an empty key."""
     found: dict[tuple[str, str], int] = {}
     table = ""
     for number, line in enumerate(text.splitlines(), start=1):

@@ -16,7 +16,7 @@ NONE = frozenset({"", "-", "--", "none", "off", "0", "w0", "16#0", "0x0"})
 def raw_of(profile: Profile, block: Block, parameter: Parameter) -> int:
     """Return the raw value with which a slot selects a parameter.
 
-    Raises MappingError where the block cannot bring or take it.
+    Raises MappingError if the block cannot hold it.
     """
     if wrong := reason_against(profile, block, parameter):
         raise MappingError(wrong)
@@ -26,7 +26,7 @@ def raw_of(profile: Profile, block: Block, parameter: Parameter) -> int:
 
 
 def pick(profile: Profile, today: Assignment, place: int, text: str) -> Assignment:
-    """A slot standing for what a person names: a code, a number, an address, or `none`.
+    """Return an assignment with a slot mapped to a typed code, number, address, or `none`.
 
     Raises MappingError and UnknownParameter.
     """
@@ -51,7 +51,11 @@ def raw_named(profile: Profile, block: Block, text: str) -> int:
 
 
 def choices(profile: Profile, block: Block, search: str = "") -> list[Parameter]:
-    """Return the parameters that a slot of the block can select, best matches first."""
+    """Return the parameters that a slot of the block can select, best matches first.
+
+    A search finds codes, numbers, addresses and names; each result contains all words of the
+    search.
+    """
     if block.selects_by == "choice":
         offered = [profile[choice.parameter] for choice in block.choices]
     else:

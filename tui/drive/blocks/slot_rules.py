@@ -26,7 +26,7 @@ def assignment_problems(
 ) -> list[Problem]:
     """Return problems and remarks of an assignment, in the order of the slots.
 
-    `unreadable` names parameters that this drive said it does not have.
+    `unreadable` are codes of parameters that this drive reported as missing.
     """
     found: list[Problem] = []
     seen: dict[int, str] = {}

@@ -22,7 +22,7 @@ FORMATS: tuple[WordFormat, ...] = get_args(WordFormat)
 
 @dataclass(frozen=True, slots=True)
 class UserWord:
-    """One word: its wire address, 0 where none is assigned, and how it is written."""
+    """One word: its wire address, 0 if none is assigned, and its format."""
 
     address: int = 0
     format: WordFormat = "hex"
@@ -41,11 +41,11 @@ UserWords = tuple[UserWord, ...]
 
 
 def word_named(profile: Profile, text: str, format: WordFormat = "hex") -> UserWord:
-    """The word that a person names: a code, a number of the manual, any address, or `none`.
+    """Return the word for a typed code, number of the manual, address, or `none`.
 
-    An address that the profile does not know is allowed: the drive decides. Raises MappingError
-    for an address above 65535 or a parameter that can only be written, UnknownParameter for a
-    name that is neither.
+    An address that the profile does not have is allowed: the drive decides. Raises MappingError for
+    an address above 65535 or a parameter that can only be written, UnknownParameter for an unknown
+    name.
     """
     wanted = text.strip()
     if wanted.casefold() in NONE:
@@ -68,6 +68,5 @@ def format_named(text: str) -> WordFormat:
 
 
 def is_no_value(profile: Profile, words: Sequence[int]) -> bool:
-    """Return True if the drive said in a reply that there is no such word, or that it is
-    protected."""
+    """Return True if the drive replied that there is no such word, or that it is protected."""
     return profile.data.reading.unknown_word in words

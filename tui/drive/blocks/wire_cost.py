@@ -1,7 +1,7 @@
-"""Cost and savings of an assignment on the wire, the best one, and the requests that use it.
+"""Time of an assignment on the wire, savings, the best assignment, and its requests.
 
-Also, for families without blocks: what neighboring parameters cost in one read, and which
-stretch of them saves most.
+For families without blocks: the time of reading adjacent parameters in one request, and the reads
+that save most.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ class Saving:
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A read of neighbors: the request, what it brings, what it takes and what it saves."""
+    """A read of adjacent words: the request, its parameters, its time and its savings."""
 
     request: ReadRequest
     brings: tuple[str, ...]
@@ -90,7 +90,8 @@ def saving(
 
 
 def span(plan: Assignment) -> tuple[int, int] | None:
-    """Address and number of words of the request that moves all slots in use; None without."""
+    """Return address and number of words of the request for all slots in use; None if none is
+    used."""
     block, length = plan.block, plan.length
     if not length:
         return None
@@ -115,7 +116,8 @@ def reach(profile: Profile, plan: Assignment, codes: Collection[str]) -> range:
 def together(
     profile: Profile, inputs: Assignment | None, outputs: Assignment | None, direction: str
 ) -> tuple[Assignment | None, Assignment | None]:
-    """Which of the two one request moves: both by function 23, else those of the direction."""
+    """Return inputs and outputs for one request: both with function 23, else those of the
+    direction."""
     if profile.function(23) is not None:
         return inputs, outputs
     return (inputs, None) if direction == "read" else (None, outputs)
@@ -131,9 +133,9 @@ def block_request(
 ) -> bytes:
     """Return the request that uses an assignment; empty if no slot is in use.
 
-    With inputs and outputs in use and function 23 in the drive, one exchange for both; else the
-    read of the inputs, or the write of the outputs where there are none. `words` are written to
-    the outputs, zeros where there are fewer; to `places` of them only, where that is given.
+    If inputs and outputs are in use, and the drive has function 23, one request does both.
+    Otherwise it reads the inputs, or writes the outputs if there are no inputs. `words` are written
+    to the outputs, with zeros for missing ones; with `places`, only those are written.
     """
     read = span(inputs) if inputs else None
     write = span(outputs) if outputs else None
@@ -173,7 +175,7 @@ def stretches(
 ) -> list[Stretch]:
     """Return the reads of adjacent words that save most for these parameters, best first.
 
-    Each parameter counts for one stretch only. Empty where the drive reads single words only.
+    Each parameter counts for one read only. Empty if the drive reads single words only.
     """
     left = sorted((profile[code] for code in dict.fromkeys(codes)), key=lambda p: p.address)
     found: list[Stretch] = []
@@ -219,9 +221,9 @@ def best_assignment(
     others: Mapping[str, int],
     unreadable: Collection[str] = (),
 ) -> Assignment:
-    """Return an assignment of the block with which reading these parameters takes least time.
+    """Return the assignment of a block with which these parameters are read fastest.
 
-    A greedy search fills one slot after another, and returns the best of all lengths, because the
+    A greedy search fills the slots one by one, and returns the best of all lengths, because the
     first slots may cost more than they save. `others` are the slots of other blocks.
     """
     left = [code for code in codes if code not in unreadable]

@@ -1,1 +1,1 @@
-"""A drive as a file describes it: its schema, loading, decoding, checking."""
+"""Description of a drive family in a file: schema, loading, decoding, checks."""

@@ -17,7 +17,7 @@ from .shared_rows import ProfileTables, read_tables
 from .toml_lines import TomlPath
 
 FAULTS_LISTED = 10
-"""Most faults to report when a profile is loaded; a check reports all."""
+"""Most faults in the error of a profile that cannot be loaded; a check lists all."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,10 +46,10 @@ def checked_data(path: Path, packaged: Path) -> ProfileData:
 
 
 def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[ProfileFault]]:
-    """The data of a profile file, None where it has no form, and all its faults by line.
+    """Return the data of a profile file, and all its faults by line.
 
-    `packaged` is the folder of the profiles that come with the panel. Raises ProfileError if the
-    file cannot be read, or is not valid TOML.
+    The data is None if the form is wrong. `packaged` is the folder of the profiles that come with
+    the panel. Raises ProfileError if the file cannot be read, or is not valid TOML.
     """
     sources = read_tables(path, packaged)
     try:

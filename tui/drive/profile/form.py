@@ -34,7 +34,7 @@ class FormFaults:
 
 @lru_cache(maxsize=4)
 def shape_of(form: type) -> shapes.Type:
-    """A form of files as its fields and their types."""
+    """Return the fields of a form of files, with their types."""
     return shapes.type_info(form)
 
 
@@ -192,7 +192,7 @@ def _invented(shape: shapes.Type) -> Any:
 
 
 def place_label(tables: dict[str, Any], path: TomlPath) -> str:
-    """A place in words: keys, rows by number, and the code of the row in brackets."""
+    """Return a place in words: keys, rows by number, and the code of the row in brackets."""
     steps = ".".join(str(s) if isinstance(s, str) else f"#{s + 1}" for s in path)
     node: Any = tables
     owner = ""

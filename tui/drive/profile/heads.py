@@ -1,7 +1,7 @@
 """Facts from a profile without decoding it: its head, and how a drive is identified.
 
-Everything is read as TOML. Of a packaged file only the tables that are asked for are; of a file
-of the user's own the whole is, so that a broken one is known for what it is.
+Of a packaged file, only the required tables are parsed. A file of the user is parsed as a whole, so
+that an error in it is found.
 """
 
 from __future__ import annotations
@@ -62,7 +62,8 @@ def file_head(path: Path, own: bool, packaged: Path) -> ProfileFileHead:
 
 
 def quick_head(path: Path) -> ProfileFileHead:
-    """The head of a file out of its first characters; empty where it is not there alone."""
+    """Return the head of a file from its first characters; empty if they do not contain all of
+    it."""
     try:
         with open(open_regular(path), encoding="utf-8") as file:
             text = file.read(HEAD_BYTES)
@@ -77,7 +78,7 @@ def request_prefixes(path: Path, own: bool, packaged: Path) -> RequestPrefixes:
 
 
 def _stamp(path: Path) -> tuple[int, int]:
-    """Changes whenever the file does."""
+    """Return a value that changes whenever the file changes."""
     try:
         reported = os.stat(path)
     except OSError:
@@ -146,7 +147,7 @@ def _requested(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -
 
 
 def _read_tables(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
-    """The tables identification and functions, among others."""
+    """Return the tables of a file, at least identification and functions."""
     if own:
         return _whole(path, packaged)
     text = read_small_text(path)

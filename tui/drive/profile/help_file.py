@@ -20,15 +20,16 @@ from .toml_lines import TomlPath
 
 FOLDER = "help"
 HelpPlace = tuple[str, int]
-"""A row of a help file: the table, and which of it."""
+"""The place of a row in a help file: table and index."""
 
 
 def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
     """Read the help on a family's faults: its own rows before those of its help file.
 
-    `folders` hold profiles; the file is sought in their folder `help`, the first found counts. From
-    a file that is not beside the profile (the first folder) rows that do not fit are omitted: it
-    belongs to another edition. Raises ProfileError with each fault, its file and line.
+    `folders` contain profiles; the first help file in their folders `help` is used. The first
+    folder is that of the profile. From a help file of another folder, rows that do not fit are
+    omitted, because it belongs to another edition. Raises ProfileError with each fault, file and
+    line.
     """
     name = (data.faults.help_file or data.profile.id) + ".toml"
     found = next((f / FOLDER / name for f in folders if (f / FOLDER / name).is_file()), None)
@@ -56,7 +57,7 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
 
 
 def help_findings(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpPlace, str]]:
-    """Places of a help file that do not fit the profile, each with what is wrong."""
+    """Return the rows of a help file that do not fit the profile, each with the reason."""
     codes = {parameter.code for parameter in data.parameters}
     for place, label, hint in _hints(reported):
         for look in hint.look_at:

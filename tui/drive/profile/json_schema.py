@@ -1,9 +1,8 @@
-"""The JSON Schema of a profile, for editors that complete and check TOML.
+"""JSON Schema of a profile, for editors that complete and check TOML.
 
-`python -m tui.drive.profile.json_schema` prints it, with `help` or `search` that of another file.
-The committed copies are in the folder `profiles`.
-
-A field that has a text below it in `schema` is described there; the others are here.
+`python -m tui.drive.profile.json_schema` prints it; with `help` or `search`, that of another file.
+The committed copies are in the folder `profiles`. A field is described by the text below it in
+`schema`, else by a text of this module.
 """
 
 from __future__ import annotations
@@ -292,7 +291,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
 
 @lru_cache(maxsize=128)
 def _written_below(table: type) -> Mapping[str, str]:
-    """Texts below the fields of a table in its source."""
+    """Return the texts below the fields of a table in its source."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(table))).body[0]
     body = tree.body if isinstance(tree, ast.ClassDef) else []
     found: dict[str, str] = {}
@@ -324,7 +323,7 @@ SCHEMA_FORMS: dict[str, tuple[type[Table], str]] = {
 
 
 def profile_schema(form: str = "profile") -> dict[str, Any]:
-    """The schema as a dictionary, generated from the structs that files are decoded into."""
+    """Return the schema as a dictionary, made from the structs into which files are decoded."""
     kind, title = SCHEMA_FORMS[form]
     (reference,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
     for table, part in parts.items():
@@ -340,7 +339,6 @@ def profile_schema(form: str = "profile") -> dict[str, Any]:
 
 
 def schema_text(form: str = "profile") -> str:
-    """The schema as it is committed."""
     return json.dumps(profile_schema(form), indent=2, ensure_ascii=False) + "\n"
 
 

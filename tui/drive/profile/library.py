@@ -1,7 +1,7 @@
-"""Finding and loading profiles, both packaged ones and the user's own.
+"""Finding and loading of profiles, packaged ones and those of the user.
 
-A listing reads the first table of a packaged file and counts its parameters, no more: a large
-profile costs nothing until it is used. A file of the user's own is read as a whole.
+A listing reads only the first table of a packaged file, and counts its parameters: a large profile
+costs nothing until it is used. A file of the user is read as a whole.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ class Listing(NamedTuple):
     parameters: int
     path: Path
     own: bool
-    """True for a profile of the user's own folder."""
+    """True for a profile in the user's folder."""
     fault: str = ""
     """Why the file cannot be used, if its head or its TOML is broken."""
     hidden_by: Path | None = None
@@ -46,9 +46,9 @@ def packaged_folder() -> Path:
 
 
 def user_folder() -> Path:
-    """The folder of the user's own profiles, in the configuration folder.
+    """Return the folder of the user's own profiles, in the configuration folder.
 
-    `DRIVEPANEL_CONFIG` names another configuration folder. Without a home there is none.
+    `DRIVEPANEL_CONFIG` names another configuration folder. None if the user has no home folder.
     """
     if configured := os.environ.get("DRIVEPANEL_CONFIG"):
         return Path(configured) / "profiles"
@@ -61,7 +61,7 @@ def user_folder() -> Path:
 
 
 def profile_files() -> Iterator[tuple[Path, bool]]:
-    """Every profile file with whether it is the user's own; the user's come first."""
+    """Return every profile file, with True for the user's own; the user's come first."""
     for folder, own in ((user_folder(), True), (packaged_folder(), False)):
         if folder.is_dir():
             for path in sorted(folder.glob("*.toml")):
@@ -69,10 +69,10 @@ def profile_files() -> Iterator[tuple[Path, bool]]:
 
 
 def listings() -> list[Listing]:
-    """All profiles by id; a user's profile takes the place of a packaged one with its id.
+    """Return all profiles by id; a user's profile replaces a packaged one with the same id.
 
-    A file whose head cannot be read is listed under its file name, so that it is seen; using it
-    then reports the fault.
+    A file with an unreadable head is listed under its file name, so that it is seen. Using it
+    reports the fault.
     """
     return [listing for listing in all_files() if listing.hidden_by is None]
 
@@ -105,7 +105,7 @@ def _listing(path: Path, own: bool) -> Listing:
 
 @lru_cache(maxsize=32)
 def load(profile_id: str) -> Profile:
-    """The profile with this id, read and checked.
+    """Load and check the profile with this id.
 
     Raises UnknownProfile, or ProfileError with the file, the place and the fault.
     """
@@ -117,7 +117,7 @@ def load(profile_id: str) -> Profile:
 
 
 def load_file(path: Path) -> Profile:
-    """The profile in a file, checked strictly; raises ProfileError."""
+    """Load and check the profile in a file; raises ProfileError."""
     from .check import checked_data
     from .profile import Profile
 
@@ -174,7 +174,7 @@ def faults_of(path: Path) -> list[str]:
 
 
 def matching_profiles(reference: str) -> list[str]:
-    """Ids of the profiles whose reference beginnings fit an identification, best first."""
+    """Return the ids of profiles whose reference prefixes fit a reported reference, best first."""
     wanted = reference.strip().upper()
     fits: list[tuple[int, str]] = []
     for listing in listings():
@@ -192,7 +192,7 @@ def mentions_function(listing: Listing, code: int) -> bool:
 
 @lru_cache(maxsize=64)
 def version_shown(profile_id: str | None, version: str) -> str:
-    """The version that a drive of a family reports, as a person reads it: 0201 may be 2.1."""
+    """Return a reported version as the family writes it: 0201 may be 2.1."""
     listing = next((item for item in listings() if item.id == profile_id), None)
     if listing is None or len(version) != 4 or not version.isdecimal():
         return version
@@ -203,7 +203,7 @@ def version_shown(profile_id: str | None, version: str) -> str:
 
 
 def demo_drives() -> dict[str, tuple[str, float]]:
-    """By id, names of the families of the demo and the frequency in Hz at which each motor runs.
+    """Return name and frequency in Hz of each motor of the demo, by profile id.
 
     Only the beginning of each file is read.
     """

@@ -1,4 +1,4 @@
-"""The text of a new profile that begins as a copy of another."""
+"""Text of a new profile that begins as a copy of another."""
 
 from __future__ import annotations
 
@@ -24,8 +24,8 @@ def new_profile_text(
 ) -> str:
     """Return a profile's text with another id, and without prefixes that recognize drives.
 
-    `rows` are all its parameters where it shares some: a profile of one's own has them itself.
-    Raises ProfileError for an id that cannot be one, and for a file without a plain head.
+    `rows` are all its parameters if it shares some, because a profile of the user contains them
+    itself. Raises ProfileError for an invalid id, and if the head cannot be copied.
     """
     if not IDENTIFIER.fullmatch(new_id):
         raise ProfileError(
@@ -59,7 +59,7 @@ def _row_text(row: Mapping[str, Any]) -> str:
 
 
 def _written(value: Any) -> str:
-    """A value as TOML writes it."""
+    """Return a value as TOML text."""
     match value:
         case bool():
             return "true" if value else "false"

@@ -1,4 +1,4 @@
-"""A profile at work: parameters by code, number, address and meaning; help on faults."""
+"""Loaded profile: parameters by code, number, address and quantity; help on faults."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class FaultGuide:
     def fault(self, raw: int | None) -> FaultHelp | None:
         """Return the help on a fault by its raw code; None if nothing is known.
 
-        A family whose trips have no numbers has one help for all of them, that of None.
+        A family whose trips have no numbers has a single help for all of them, with the key None.
         """
         return self._found[0].get(raw if self._numbered else None)
 
@@ -91,7 +91,7 @@ def unpacked_profile(packed: bytes) -> Profile:
 
 
 class Profile:
-    """A drive family's description, with the look-ups that the rest of the panel needs."""
+    """Description of a drive family, with the look-ups that the other packages need."""
 
     def __init__(
         self,
@@ -125,32 +125,29 @@ class Profile:
 
     @property
     def id(self) -> str:
-        """Id of the profile, as typed on a command line."""
         return self.data.profile.id
 
     @property
     def name(self) -> str:
-        """Name of the drive family."""
         return self.data.profile.name
 
     @property
     def vendor(self) -> str:
-        """Maker of the drive family."""
         return self.data.profile.vendor
 
     def __getitem__(self, code: str) -> Parameter:
-        """The parameter with exactly this code; raises UnknownParameter."""
+        """Return the parameter with exactly this code; raises UnknownParameter."""
         try:
             return self._by_code[code]
         except KeyError:
             raise UnknownParameter(f"{self.name} has no parameter {code!r}.") from None
 
     def get(self, code: str) -> Parameter | None:
-        """The parameter with exactly this code, or None."""
+        """Return the parameter with exactly this code; None if there is none."""
         return self._by_code.get(code)
 
     def at(self, address: int, function: int = 3) -> Parameter | None:
-        """The parameter at a wire address, the first of its fields where it has several, or None.
+        """Return the parameter at a wire address, the first one if several share it; None if none.
 
         `function` is 4 for an input register.
         """
@@ -161,7 +158,7 @@ class Profile:
         return self._by_quantity.get(quantity)
 
     def function(self, code: int) -> Function | None:
-        """A supported Modbus function with its limits, or None."""
+        """Return a supported Modbus function with its limits; None if it is not supported."""
         return self._functions.get(code)
 
     def fault(self, raw: int) -> FaultCode | None:
@@ -170,7 +167,8 @@ class Profile:
 
     @cached_property
     def packed(self) -> bytes:
-        """The profile without its help as bytes, for another process; see `unpacked_profile`."""
+        """Return the profile without its help as bytes, for another process; see
+        `unpacked_profile`."""
         return zlib.compress(msgspec.json.encode(self.data), 1)
 
     @cached_property
@@ -205,7 +203,8 @@ class Profile:
         )
 
     def chart(self, raws: Mapping[str, int]) -> Chart | None:
-        """The state chart in force, given raw values by code; the first whose condition holds."""
+        """Return the active state chart, from raw values by code: the first whose condition
+        holds."""
         fallback: Chart | None = None
         for chart in self.data.charts:
             if chart.when is None:
@@ -217,11 +216,10 @@ class Profile:
     def scale(
         self, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
     ) -> Decimal | None:
-        """Return the value of one count, given raw values by code.
+        """Return the value of one count, from raw values by code.
 
-        `absent` names parameters that the drive said it does not have. None where the scale
-        follows another parameter whose value is not known: then the value must be shown raw
-        and never written.
+        `absent` names parameters that the drive reported as missing. None if the scale depends on a
+        parameter whose value is unknown: then the value must be shown raw and never written.
         """
         follows = parameter.scale_by
         if follows is None:
@@ -276,7 +274,7 @@ def parse_address(text: str) -> int | None:
 
 
 def notations(parameter: Parameter) -> tuple[str, str, str]:
-    """The three notations of a parameter's place: drive code, manual's number, wire address."""
+    """Return the three notations of a parameter: drive code, manual's number, wire address."""
     return parameter.code, parameter.number, f"{parameter.address} (16#{parameter.address:04X})"
 
 

@@ -1,8 +1,8 @@
-"""A profile's tables with the rows that it shares with others, and the place of each of them.
+"""Tables of a profile with the rows that it shares with others, and the place of each row.
 
-`profile.rows_from` names files beside the profile. Their tables come first; a row of the profile
-with the same key (code, id, raw) changes fields of the shared one; any other is added after the row
-above it in its file, or at the end.
+`profile.rows_from` names files in the folder of the profile. Their tables come first. A row of the
+profile with the same key (code, id, raw) changes fields of the shared one. Any other row is added
+after the row above it in its file, or at the end.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ ROW_KEYS: Mapping[TomlPath, str] = {
     ("enumerations",): "id",
     ("parameters",): "code",
 }
-"""By the place of a list of rows, the field that identifies its rows."""
+"""By the place of a list of rows, the field that identifies a row."""
 
 
 @dataclass(frozen=True)
@@ -64,10 +64,11 @@ class ProfileTables:
 
     tables: dict[str, Any]
     origins: Mapping[TomlPath, list[RowOrigin]] = field(default_factory=dict)
-    """By path, its place, the profile's own file first; rows only, if several files."""
+    """Place of each path; only of rows, if there are several files. The profile's own file comes
+    first."""
 
     def place(self, path: TomlPath) -> tuple[str, int]:
-        """File and line of a path; of the row that contains it, if it has no place of its own."""
+        """Return file and line of a path, or of the row that contains it."""
         for length in range(len(path), -1, -1):
             for source, start in self.origins.get(path[:length], ()):
                 if (line := source.lines.get((*start, *path[length:]))) is not None:
@@ -82,10 +83,9 @@ class ProfileTables:
 
 
 def read_tables(path: Path, packaged: Path) -> ProfileTables:
-    """The tables of a profile file with its shared rows; raises ProfileError.
+    """Return the tables of a profile file with its shared rows; raises ProfileError.
 
-    `packaged` is the folder in which a file of shared rows is looked for that is not beside the
-    profile.
+    `packaged` is the folder that is searched for shared rows if the profile's folder lacks them.
     """
     own = source_text(path)
     tables = parsed(own)
@@ -146,13 +146,13 @@ def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
 
 
 def _key_of(row: Mapping[str, Any], key: str) -> object:
-    """Return the key of a row; the text of a list or table, which is reported as a fault later."""
+    """Return the key of a row; if it is a list or table, its text, which is reported later."""
     value = row.get(key)
     return repr(value) if isinstance(value, list | dict) else value
 
 
 class _Merging:
-    """Tables of several files put together, later files over earlier ones."""
+    """Tables of several files merged, later files over earlier ones."""
 
     def __init__(self) -> None:
         self.origins: dict[TomlPath, list[RowOrigin]] = {}
@@ -188,7 +188,7 @@ class _Merging:
         there: TomlPath,
     ) -> None:
         key = ROW_KEYS[at]
-        # rows of one file do not change each other: two of one key are a fault to be told
+        # rows of one file do not change each other: two with the same key are an error
         index = {_key_of(row, key): n for n, row in enumerate(rows) if isinstance(row, dict)}
         order = list(range(len(rows)))
         above = -1

@@ -1,8 +1,8 @@
 """Stop words of all families, known without decoding their profiles.
 
-A stop of a drive that nobody has named yet compares the words of all families. To load them all
-takes seconds on a small computer, so of a packaged file only the charts are read as TOML, and
-the addresses of its parameters are picked out of its text.
+A stop of a drive whose family is unknown compares the words of all families. Loading all profiles
+takes seconds on a small computer. So only the charts of a packaged file are parsed as TOML, and the
+addresses of its parameters are found in its text.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ODD = re.compile(r"^(?:function|mask|shift|type) = ", re.MULTILINE)
 
 @dataclass(frozen=True, slots=True)
 class StopProfile:
-    """The charts of one family, and where the words lie that they speak of."""
+    """Charts of one family, and the addresses of the words that they use."""
 
     id: str
     name: str
@@ -39,16 +39,17 @@ class StopProfile:
     places: Mapping[str, int]
     """Address by code, of whole words that function 3 reads."""
     names_itself: bool
-    """True if its drives know function 43; the others are silent at words that they lack."""
+    """True if its drives support function 43; others do not answer reads of words that they
+    lack."""
 
     @property
     def addresses(self) -> frozenset[int]:
-        """All addresses that its parameters have."""
+        """Addresses of all words in `places`."""
         return frozenset(self.places.values())
 
 
 def stop_profile() -> tuple[StopProfile, ...]:
-    """Those of every family whose file can be used, in the order of their ids."""
+    """Return the stop profiles of all families with a usable file, sorted by id."""
     found = (_facts(listing) for listing in library.listings() if not listing.fault)
     return tuple(profile for profile in found if profile is not None)
 
@@ -67,7 +68,7 @@ def _facts(listing: library.Listing) -> StopProfile | None:
 
 
 def stop_profile_of(profile: Profile, *, names_itself: bool = True) -> StopProfile:
-    """Those of a family that is loaded."""
+    """Return the stop profile of a loaded family."""
     places = {
         parameter.code: parameter.address
         for parameter in profile.parameters
@@ -77,7 +78,7 @@ def stop_profile_of(profile: Profile, *, names_itself: bool = True) -> StopProfi
 
 
 def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:
-    """Charts and addresses out of a packaged file's text; None where it has to be loaded."""
+    """Return charts and addresses from a packaged file's text; None if it must be loaded."""
     try:
         text = read_small_text(path)
     except (OSError, UnicodeDecodeError):

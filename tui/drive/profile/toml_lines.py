@@ -1,6 +1,6 @@
-"""On which line of a TOML text each table, key and element of a list begins.
+"""Line of each table, key and list element of a TOML text.
 
-The text is valid TOML, checked before: this only finds places in it.
+The text must be valid TOML: this only finds places in it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ _OTHER = re.compile(r"[^,\]}#\n]+")
 
 
 def toml_lines(text: str) -> dict[TomlPath, int]:
-    """Lines from 1, by path."""
+    """Return line numbers, from 1, by path."""
     return _Scan(text).lines
 
 
@@ -43,13 +43,13 @@ class _Scan:
         self.lines.setdefault(path, self._line())
 
     def _blank(self) -> str:
-        """The character after blanks, commas and comments; empty at the end."""
+        """Return the character after blanks, commas and comments; empty at the end."""
         if found := _BLANK.match(self.text, self.at):
             self.at = found.end()
         return self.text[self.at : self.at + 1]
 
     def _keys(self) -> list[str]:
-        """A key, in its parts."""
+        """Read a key; return its parts."""
         parts: list[str] = []
         while found := _KEY.match(self.text, self.at):
             parts.append(found[1] or found[2] or found[3] or "")
@@ -87,7 +87,7 @@ class _Scan:
         return path
 
     def _pair(self, table: TomlPath) -> bool:
-        """A key with its value; False where there is no key."""
+        """Read a key with its value; return False if there is no key."""
         start = self.at
         parts = self._keys()
         if not parts:
@@ -95,7 +95,7 @@ class _Scan:
         end, self.at = self.at, start
         for length in range(1, len(parts) + 1):
             self._note((*table, *parts[:length]))
-        self.at = end + 1  # behind the equals sign
+        self.at = end + 1  # after the equals sign
         while self.text[self.at : self.at + 1] in (" ", "\t"):
             self.at += 1
         self._value((*table, *parts))

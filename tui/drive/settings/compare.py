@@ -1,4 +1,4 @@
-"""Comparing two parameter sets: of files, of a drive, of the factory settings."""
+"""Comparison of two parameter sets: of files, a drive, or the factory settings."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NOTHING = "-"
 
 @dataclass(frozen=True, slots=True)
 class Side:
-    """One of the two things that are compared."""
+    """One of the two compared sets."""
 
     label: str
     raws: Mapping[str, int]
@@ -33,14 +33,14 @@ class Side:
     texts: Mapping[str, str] = field(default_factory=dict)
     """Text instead of a number: a factory setting that depends on the rating."""
     unsure: Mapping[str, str] = field(default_factory=dict)
-    """Codes of values that no document of the family states, and how that is reported."""
+    """Codes of values that no document of the family states, with the remark on it."""
     left: Mapping[str, str] = field(default_factory=dict)
     """Codes that are not compared with this side, and why."""
 
 
 @dataclass(frozen=True, slots=True)
 class ComparedRow:
-    """One parameter on both sides."""
+    """A parameter with its values on both sides."""
 
     code: str
     name: str
@@ -54,14 +54,14 @@ class ComparedRow:
 
 
 def side_of(label: str, values: ParameterSet) -> Side:
-    """A parameter set as a side."""
+    """Return a parameter set as a side."""
     return Side(label, values.raws, values.absent)
 
 
 def factory_side(profile: Profile, other: ParameterSet) -> Side:
-    """The factory settings of a profile as a side, on the drive whose other values are these.
+    """Return the factory settings of a profile as a side, for the drive with these other values.
 
-    Address, baud and format are left: they are set for the line that the drive is on.
+    Address, baud rate and format are not compared, because they depend on the line.
     """
     raws: dict[str, int] = {}
     texts = {p.code: p.factory_text for p in profile.parameters if p.factory_text}
@@ -86,17 +86,20 @@ def factory_side(profile: Profile, other: ParameterSet) -> Side:
 
 
 def _nearly(factory: int, held: int | None) -> bool:
-    """A product of the drive's current is within a count: the drive may round it otherwise."""
+    """Return True if two values differ by one count at most.
+
+    A product of the drive's current may be rounded differently by the drive.
+    """
     return held is not None and abs(held - factory) <= 1
 
 
 def compare_settings(
     profile: Profile, a: Side, b: Side, *, all_rows: bool = False
 ) -> list[ComparedRow]:
-    """Differences of the settings in the profile's order; every parameter with `all_rows`.
+    """Return the differing settings in the profile's order, or every parameter with `all_rows`.
 
-    Measurements, commands and counters never differ: they are not settings. A factory setting that
-    is not known differs from nothing.
+    Measurements, commands and counters are not settings, and never differ. An unknown factory
+    setting differs from nothing.
     """
     rows = [
         _row(profile, parameter, a, b)
@@ -158,11 +161,11 @@ def _plain(number: Decimal) -> Decimal:
     return number.normalize()
 
 
-# As text
+# Text
 
 
 def rows_text(rows: Sequence[ComparedRow], labels: tuple[str, str], format_: TableFormat) -> str:
-    """The rows as aligned text, as a Markdown table, or as CSV with raw values."""
+    """Return the rows as aligned text, as a Markdown table, or as CSV with raw values."""
     if format_ == "csv":
         return _csv(rows, labels)
     return _markdown(rows, labels) if format_ == "markdown" else _plain_text(rows, labels)

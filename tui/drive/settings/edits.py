@@ -1,6 +1,6 @@
 """Staged edits of one drive's settings, as typed and as raw values.
 
-Everything here is pure: nothing is written. Applying them is session/settings/apply.py.
+Pure: nothing is written here; `tui.session.settings.apply` does that.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ class Edit:
     typed: str
     """Typed text, encoded again if its scale changes; empty for a raw value."""
     old: int | None
-    """Raw value that the drive held when it was staged; None where it was not read."""
+    """Raw value that the drive held when it was staged; None if it was not read."""
     new: int
     text: str = ""
     """The new value as the drive will hold it."""
@@ -52,7 +52,8 @@ class Edits:
     """Edits in the order in which they were staged; each change gives a new object."""
 
     requested: tuple[Edit, ...] = ()
-    """All that was staged, also what the drive holds as it is: under another scale it may not."""
+    """All staged edits, including values that the drive already holds: they count if their scale
+    changes."""
 
     @property
     def items(self) -> tuple[Edit, ...]:
@@ -69,7 +70,7 @@ class Edits:
         return any(edit.code == code for edit in self.items)
 
     def get(self, code: str) -> Edit | None:
-        """The edit of a parameter, or None."""
+        """Return the edit of a parameter; None if there is none."""
         return next((edit for edit in self.items if edit.code == code), None)
 
     def stage(
@@ -80,10 +81,11 @@ class Edits:
         raws: Mapping[str, int],
         absent: Collection[str] = (),
     ) -> Edits:
-        """Stage what a person typed for a parameter; raises ValueRefused and UnknownParameter.
+        """Stage a typed value; raises ValueRefused and UnknownParameter.
 
-        `raws` is what the drive holds, by code; `absent` what it has not. A value equal to the held
-        one is not an edit. Edits whose scale this one changes keep their engineering value.
+        `raws` are the drive's raw values by code, `absent` the codes that it lacks. A value that
+        the drive already holds is not an edit. Edits whose scale this one changes keep their
+        engineering value.
         """
         edit = Edit(profile[code].code, typed, raws.get(code), 0)
         return self._with([edit], profile, raws, absent)
@@ -96,7 +98,7 @@ class Edits:
         raws: Mapping[str, int],
         absent: Collection[str] = (),
     ) -> Edits:
-        """Stage a raw value, whatever it means with its scale; raises ValueRefused."""
+        """Stage a raw value, independent of its scale; raises ValueRefused."""
         return self._with(
             [Edit(profile[code].code, "", raws.get(code), raw)], profile, raws, absent
         )
@@ -118,12 +120,14 @@ class Edits:
         raws: Mapping[str, int],
         absent: Collection[str] = (),
     ) -> Edits:
-        """Without the edit of one parameter; those that follow its scale are encoded again."""
+        """Return the edits without that of one parameter; those that depend on its scale are
+        encoded again."""
         left = [edit for edit in self.requested if edit.code != code]
         return Edits(_resolve(left, profile, raws, absent))
 
     def now(self, profile: Profile, raws: Mapping[str, int], absent: Collection[str] = ()) -> Edits:
-        """The same edits against other held values; those that the drive holds are not edits."""
+        """Return the same edits for other present values; values that the drive holds are not
+        edits."""
         fresh = [replace(edit, old=raws.get(edit.code, edit.old)) for edit in self.requested]
         return Edits(_resolve(fresh, profile, raws, absent))
 
@@ -145,7 +149,8 @@ class Edits:
 def _resolve(
     edits: list[Edit], profile: Profile, raws: Mapping[str, int], absent: Collection[str]
 ) -> tuple[Edit, ...]:
-    """The edits encoded with the scales that hold after all of them, scale sources first."""
+    """Return the edits encoded with the scales that apply after all of them, scale sources
+    first."""
     after = dict(raws)
     done: dict[str, Edit] = {}
     for follows in (False, True):

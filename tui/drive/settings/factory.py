@@ -1,7 +1,7 @@
 """Factory setting of a parameter on the present drive, and detection of changes from it.
 
-Some follow another parameter (50 or 60 Hz), some the drive's rated current, and of some only words
-are known. Uncertain settings count as unchanged.
+Some depend on another parameter (50 or 60 Hz), some on the drive's rated current, and some are
+known only in words. Uncertain settings count as unchanged.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def factory_value(
 ) -> Value | None:
     """Decode the factory setting with the scale that the drive had when it left the factory.
 
-    A ramp that left the factory with 30 counts of 0.1 s is 3.0 s, whatever a count is worth now.
+    A ramp that left the factory with 30 counts of 0.1 s is 3.0 s, independent of the present scale.
     """
     raw = factory_raw(profile, parameter, raws, absent)
     if raw is None:
@@ -85,18 +85,18 @@ def _differs(
     raws: Mapping[str, int],
     absent: Collection[str],
 ) -> bool:
-    """Return True if what is held means something else than the factory setting; raw values
-    both."""
+    """Return True if the held value means something else than the factory setting; both are raw
+    values."""
     held, factory = pair
     if parameter.factory_of is not None:
-        # the drive may round its own product the other way
+        # the drive may round its own product differently
         return abs(held - factory) > 1
     if parameter.scale_by is None:
         return held != factory
     first = _first_scales(profile, parameter, raws, absent)
     was = shown(profile, parameter, factory, first, absent)
     now = shown(profile, parameter, held, raws, absent)
-    # without a scale nobody can tell
+    # without a scale the values cannot be compared
     return was.unit == now.unit and was.number != now.number
 
 

@@ -28,21 +28,21 @@ class LimitsInForce:
     """Code of the parameter that sets the lowest value; empty if the limit is fixed."""
     high_by: str = ""
     sure: bool = True
-    """False if no document of the family states them: marked with a ?."""
+    """False if no document of the family states them; then they are marked with `?`."""
 
     @property
     def text(self) -> str:
         """The range as text, with the parameters that set its ends."""
         if self.low is None and self.high is None:
             return ""
-        # the mark before what sets them: it stays where the end is cut off
+        # the mark comes first, so that it remains if the end is cut off
         unit = (f" {self.unit}" if self.unit else "") + ("" if self.sure else " ?")
         by_low, by_high = (f" ({by})" if by else "" for by in (self.low_by, self.high_by))
         if self.low is None:
             return f"up to {self.high:f}{unit}{by_high}"
         if self.high is None:
             return f"from {self.low:f}{unit}{by_low}"
-        # what sets both stands once, behind them
+        # a parameter that sets both ends is named once, at the end
         first = f"{self.low:f}" if by_low == by_high else f"{self.low:f}{by_low}"
         return f"{first} .. {self.high:f}{unit}{by_high}"
 

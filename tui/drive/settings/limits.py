@@ -28,8 +28,7 @@ def limit_pairs(profile: Profile) -> tuple[tuple[str, str], ...]:
 
 
 def _comparable(profile: Profile, low: str, high: str) -> bool:
-    """Return True if both are settings of one unit: what a line commands is checked with the
-    command."""
+    """Return True if both are settings with one unit; commands are checked when they are sent."""
     pair = profile[low], profile[high]
     return pair[0].unit == pair[1].unit and not any(
         is_order(profile, parameter) for parameter in pair
@@ -107,7 +106,7 @@ def _past_multiples(
 
 
 def passed_side(parameter: Parameter, of: Multiple, number: Decimal, limit: Decimal) -> str:
-    """On which side of this limit a number is, where it passed it: `below`, `above`, or nothing."""
+    """Return on which side a number exceeds a limit: `below`, `above`, or empty for neither."""
     if of is parameter.min_of and number < limit:
         return "below"
     return "above" if of is parameter.max_of and number > limit else ""

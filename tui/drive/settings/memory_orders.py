@@ -1,4 +1,4 @@
-"""Commands that save a drive's settings and recall its factory settings."""
+"""Commands that save a drive's settings and restore its factory settings."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ..profile.schema import MemoryOrder
 
 
 class MemoryRefused(DriveError):
-    """The settings cannot be saved or recalled over Modbus; the text gives the reason."""
+    """The settings cannot be saved or restored over Modbus; the text gives the reason."""
 
 
 def save_order(profile: Profile) -> MemoryOrder:

@@ -1,8 +1,8 @@
-"""A parameter set as text: one line a parameter, in the order of the profile, made for a diff.
+"""A parameter set as text: one line per parameter, in the order of the profile, easy to compare.
 
-It is TOML. A person may edit the `value` of a line by hand after taking its `raw` out; with both in
-a line they must agree. Header and end state the number of parameters, so that a file that was cut
-short is noticed.
+It is TOML. A person may edit the `value` of a line after deleting its `raw`; if a line has both,
+they must agree. Header and end state the number of parameters, so that a file that was cut short is
+detected.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ class SetHead:
 
 @dataclass(frozen=True, slots=True)
 class ParameterSet:
-    """Raw values of one drive by code, with what could not be read."""
+    """Raw values of one drive by code, with those that could not be read."""
 
     head: SetHead
     raws: Mapping[str, int]
@@ -58,13 +58,14 @@ class ParameterSet:
     lines: Mapping[str, int] = field(default_factory=dict)
     """Line of each code in its file."""
     notes: Mapping[str, str] = field(default_factory=dict)
-    """By code, what is to be known of a value that was edited by hand: its rounding."""
+    """By code, the remark on a value that was edited by hand and rounded."""
     lossy: frozenset[str] = frozenset()
-    """Codes of values that rounding makes others of, edited by hand."""
+    """Codes of values, edited by hand, that rounding changes."""
 
 
 def dump_set(profile: Profile, values: ParameterSet) -> str:
-    """The text of a parameter set; the same values give the same text but for time and line."""
+    """Return the text of a parameter set; the same values give the same text except for time and
+    line."""
     head = values.head
     known = [p for p in profile.parameters if p.code in values.raws]
     lines = [
@@ -116,7 +117,7 @@ def _line(profile: Profile, parameter: Parameter, values: ParameterSet) -> str:
 
 
 def lacking(profile: Profile, raws: Mapping[str, int]) -> frozenset[str]:
-    """Scale sources without a value: the drive does not have them, as far as a set can show."""
+    """Return the scale sources without a value; by the set, the drive does not have them."""
     return frozenset(code for code in scale_sources(profile) if code not in raws)
 
 

@@ -29,9 +29,9 @@ class Options:
     """Options of a restore."""
 
     line_settings: bool = False
-    """Write address, baud and format too, which may cut this very line."""
+    """Write address, baud rate and format as well, although this may cut the present line."""
     rating: bool = False
-    """Write motor and rating data to a drive of another rating too."""
+    """Write motor and rating data even if the rating differs."""
     confirmed: frozenset[str] = frozenset()
     """Codes of unverified parameters that the user has confirmed."""
     rounded: bool = False
@@ -84,5 +84,5 @@ class RestorePlan:
         return [item for item in self.items if item.kind == kind]
 
     def count(self, kind: ItemKind) -> int:
-        """Return the number of items of one kind; what is not a setting does not count."""
+        """Return the number of items of one kind; items that are not settings do not count."""
         return sum(1 for item in self.items_of_kind(kind) if item.reason != "no setting")

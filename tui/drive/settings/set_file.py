@@ -59,8 +59,8 @@ class _Fault:
 def load_set(text: str, file: str, profile_of: Callable[[str], Profile]) -> ParameterSet:
     """Parse a parameter set; `profile_of` returns a profile by its id.
 
-    Raises SetError with file and line for what is cut short, foreign or contradicts itself,
-    and what `profile_of` raises.
+    Raises SetError with file and line if the set is cut short, of another kind or contradictory,
+    and the errors of `profile_of`.
     """
     fault = _Fault(file)
     tables = _tables(text, fault)
@@ -127,7 +127,7 @@ def _head(tables: Mapping[str, Any], text: str, fault: _Fault) -> SetHead:
 
 
 def _check_whole(tables: Mapping[str, Any], text: str, count: int, fault: _Fault) -> None:
-    """Raise SetError unless header and end state the number of parameters that are there."""
+    """Raise SetError unless header and end state the number of parameters in the file."""
     last = text.count("\n") + 1
     if END_OF_SET not in tables:
         raise fault(
@@ -280,7 +280,7 @@ class FileThere(SetError):
 def read_set(path: Path, name: str = "") -> ParameterSet:
     """Read a parameter set; raises SetError, UnknownProfile and ProfileError.
 
-    `name` is what errors call the file, its path unless given.
+    `name` is the name of the file in errors (default: its path).
     """
     name = name or str(path)
     try:
@@ -297,10 +297,10 @@ def read_set(path: Path, name: str = "") -> ParameterSet:
 def write_file(
     path: Path, content: str | bytes, *, force: bool = False, private: bool = False
 ) -> None:
-    """Write a file so that it is there whole, on the disk, or as it was before.
+    """Write a file completely and flushed, or leave it unchanged.
 
-    A `private` file is for its owner alone. Raises FileThere where the file exists and `force` is
-    not given, SetError where the folder does not take it.
+    A `private` file is readable only by its owner. Raises FileThere if the file exists and `force`
+    is False, SetError if the folder refuses it.
     """
     data = content.encode("utf-8") if isinstance(content, str) else content
     mode = PRIVATE_FILE_MODE if private else USUAL_FILE_MODE
@@ -336,7 +336,7 @@ def _put(part: Path, path: Path, *, force: bool) -> None:
             f"{path} already exists. Choose another name, or use --force to replace it."
         ) from error
     except (OSError, NotImplementedError):
-        # a file system without links; the name was free at the check before
+        # the file system has no links; the name was free at the check before
         part.replace(path)
 
 

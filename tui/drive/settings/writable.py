@@ -24,7 +24,7 @@ ORDER_QUANTITIES: frozenset[Quantity] = frozenset(
         "digital_outputs",
     }
 )
-"""Quantities that are commands, which have their own screens and CLI commands."""
+"""Quantities that are commands; they have their own screens and CLI commands."""
 AT_REST: frozenset[StateKind] = frozenset({"blocked", "ready", "stopped", "fault"})
 """Kinds of state in which the motor is certainly not commanded to turn."""
 CUTTING = frozenset({"address", "baud", "format", "parity", "protocol"})
@@ -65,7 +65,7 @@ def is_setting(profile: Profile, parameter: Parameter) -> bool:
 
 
 def needs_standstill(profile: Profile, parameter: Parameter) -> bool:
-    """Return True if the motor must be at rest, by the parameter's access or by its block's
+    """Return True if the motor must be at standstill, by the parameter's access or its block's
     rule."""
     block = slot_of(profile, parameter.code)
     return parameter.access == "rw-stopped" or (block is not None and block.write_when == "stopped")
@@ -89,8 +89,8 @@ def write_refusal(
 ) -> Refusal | None:
     """Return why a parameter must not be written as a setting now; None if it may be.
 
-    `state` is the kind of the drive's state, None while it is not known; `confirmed` holds codes
-    of unverified parameters that the user has confirmed.
+    `state` is the kind of the drive's state, None if unknown. `confirmed` are codes of unverified
+    parameters that the user has confirmed.
     """
     code = parameter.code
     if parameter.forbidden:
@@ -156,8 +156,7 @@ def cuts_line(profile: Profile, parameter: Parameter) -> bool:
 
 
 def waits_for_reset(profile: Profile, parameter: Parameter) -> bool:
-    """Return True if a written value comes into force only when the drive is reset or switched
-    on."""
+    """Return True if a written value takes effect only when the drive is reset or switched on."""
     block = slot_of(profile, parameter.code)
     if block is not None and block.effective == "after-reset":
         return True
@@ -178,7 +177,7 @@ def never_set(profile: Profile, parameter: Parameter, raw: int) -> str:
 
 
 def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
-    """Return the danger of a value of the drive's communication watch; else empty."""
+    """Return the danger of a value of the drive's communication timeout; else empty."""
     watch = profile.data.communication_fault
     if watch is None:
         return ""

@@ -1,4 +1,4 @@
-"""Rules that a profile's form cannot express: a subject per module, each with its place."""
+"""Rules that a profile's form cannot express: one subject per module, each error with its place."""
 
 from __future__ import annotations
 

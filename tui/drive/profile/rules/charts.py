@@ -1,4 +1,4 @@
-"""Rules for state charts: what runs can be stopped, seen running, and seen in fault."""
+"""Rules for state charts: a motor that can run can be stopped, and its states can be seen."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from ..toml_lines import TomlPath
 
 RUN_ORDERS = frozenset({"forward", "reverse"})
 SURE_STOPS = ("stop", "quick-stop", "freewheel")
-"""Orders that bring a motor to rest in any family."""
+"""Orders that bring a motor to standstill in any family."""
 NOT_TURNING = frozenset({"blocked", "ready", "stopped"})
 
 
 def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """States that transitions and orders name, and words to write with a place for them."""
+    """Yield unknown states in transitions and orders, and orders without words or register."""
     for index, chart in enumerate(data.charts):
         at: TomlPath = ("charts", index)
         ids = [state.id for state in chart.states]
@@ -47,7 +47,7 @@ def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Each state of a chart can be seen."""
+    """Yield states that can never be reached."""
     for index, chart in enumerate(data.charts):
         for place, state in enumerate(chart.states):
             at: TomlPath = ("charts", index, "states", place)
@@ -68,7 +68,7 @@ def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def stops_always(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """A motor that can be run can be stopped, in whatever state it is."""
+    """Yield charts that can run a motor, but not stop it in every state."""
     for index, chart in enumerate(data.charts):
         if not _runs(chart):
             continue
@@ -90,7 +90,7 @@ def stops_always(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def whole_chart_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Commands and status are whole words of 16 bits: no others can be written or stopped by."""
+    """Yield commands and status words that are not whole words of 16 bits."""
     parameters = {parameter.code: parameter for parameter in data.parameters}
     for index, chart in enumerate(data.charts):
         at: TomlPath = ("charts", index)
@@ -117,7 +117,10 @@ def whole_chart_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def chart_words_in_reach(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Status words can be read, command words written, and those that stop also at speed."""
+    """Yield status words that cannot be read, and command words that cannot be written.
+
+    The word of a stop must be writable while the motor turns.
+    """
     access = {parameter.code: parameter.access for parameter in data.parameters}
     for index, chart in enumerate(data.charts):
         at: TomlPath = ("charts", index)
@@ -149,7 +152,7 @@ def chart_words_in_reach(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def running(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """An order to run leads to a state in which the drive is seen to run."""
+    """Yield charts whose run command reaches no state of the kind running."""
     for index, chart in enumerate(data.charts):
         if not _runs(chart):
             continue
@@ -178,7 +181,7 @@ def running(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def faults_seen(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """A tripped drive is seen as tripped."""
+    """Yield charts that cannot show a tripped drive."""
     if data.faults.parameter:
         return
     for index, chart in enumerate(data.charts):
@@ -192,7 +195,7 @@ def faults_seen(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def conditions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Of several charts each but one says when it holds."""
+    """Yield charts without a condition, except one."""
     without = [n for n, chart in enumerate(data.charts) if chart.when is None]
     for index in without[1:]:
         yield (

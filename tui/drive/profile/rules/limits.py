@@ -11,7 +11,7 @@ from ..toml_lines import TomlPath
 
 
 def circles(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Limits that lead back to where they began, and scales that follow each other."""
+    """Yield limits that form a circle, and scales that depend on each other."""
     known = {parameter.code for parameter in data.parameters}
     above: dict[str, set[str]] = {}
     follows: dict[str, set[str]] = {}
@@ -37,7 +37,7 @@ def circles(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def _circle(ways: dict[str, set[str]], start: str) -> list[str]:
-    """A way from a code back to itself; empty where there is none."""
+    """Return a way from a code back to itself; empty if there is none."""
     open_ways = [[start]]
     seen: set[str] = set()
     while open_ways:
@@ -52,7 +52,7 @@ def _circle(ways: dict[str, set[str]], start: str) -> list[str]:
 
 
 def proposed_values(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Each value that is proposed or compared can be held by its parameter."""
+    """Yield values of the profile that their parameter cannot hold."""
     parameters = {parameter.code: parameter for parameter in data.parameters}
     names = {enumeration.id: enumeration.values for enumeration in data.enumerations}
     for place, code, raw in _proposed(data):
@@ -92,11 +92,11 @@ def _line_numbers(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
 
 
 def _refused(parameter: Parameter, raw: int, names: dict[str, str]) -> str:
-    """Why a parameter cannot hold a raw value; empty where it can."""
+    """Return why a parameter cannot hold a raw value; empty if it can."""
     if str(raw) in names:
         return ""
     low, high = type_range(parameter)
-    # a word may be written as it goes on the wire, whatever its sign
+    # a word may be written as it is on the wire, whatever its sign
     if not low <= raw <= high and not 0 <= raw <= 0xFFFF:
         return f"does not fit {parameter.type}: {low} to {high}."
     if names and is_enumeration(parameter):
@@ -109,7 +109,7 @@ def _refused(parameter: Parameter, raw: int, names: dict[str, str]) -> str:
 
 
 def factory_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Factory settings that follow another parameter, against that one's own factory setting."""
+    """Yield factory settings that contradict the other parameter's own factory setting."""
     factory = {p.code: p.factory for p in data.parameters}
     for index, parameter in enumerate(data.parameters):
         by = parameter.factory_by
@@ -128,7 +128,7 @@ def factory_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def start_up(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """A parameter belongs to one step of the first commissioning."""
+    """Yield parameters that are in two steps of the first commissioning."""
     seen: dict[str, str] = {}
     for index, step in enumerate(data.start_up):
         for code in step.parameters:

@@ -1,4 +1,4 @@
-"""Rules for names: every parameter, state and word that a profile names is there."""
+"""Rules for names: every parameter, state and word that a profile names exists."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ WORD_FORMS = {
     re.compile(r"W[0-9]"): re.compile(r"\bW[0-9]{3,5}\b"),
     re.compile(r"[0-9]+\.[0-9]"): re.compile(r"\b[0-9]{1,2}\.[0-9]{2}\b"),
 }
-"""Names of a word in texts, by how the numbers of a family are written."""
+"""Pattern of the words named in texts, by the notation of the family's numbers."""
 
 
 def references(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Every code that is named somewhere."""
+    """Yield codes of parameters that do not exist."""
     codes = [parameter.code for parameter in data.parameters]
     known = set(codes)
     for place, code in named_parameters(data):
@@ -32,7 +32,7 @@ def references(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def named_parameters(data: ProfileData) -> Iterator[NamedPlace]:
-    """Every place that names a parameter, with the code it names."""
+    """Yield every place that names a parameter, with its code."""
     for index, parameter in enumerate(data.parameters):
         for key, code in _parameter_names(parameter):
             yield ("parameters", index, key), code
@@ -163,14 +163,14 @@ def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
 
 
 def own_id(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """The id is none of the words of `drivepanel profiles`."""
+    """Yield an id that is also a word of `drivepanel profiles`."""
     if data.profile.id in TAKEN_IDS:
         taken = ", ".join(sorted(TAKEN_IDS))
         yield ("profile", "id"), f"{data.profile.id!r} is reserved, as are {taken}."
 
 
 def groups_in_use(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """A group that is described has parameters."""
+    """Yield described groups without parameters."""
     known = {parameter.group for parameter in data.parameters}
     for index, group in enumerate(data.groups):
         if group.name not in known:
@@ -178,7 +178,7 @@ def groups_in_use(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def fault_of_the_line(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """The fault of a lost line is among the faults."""
+    """Yield the fault of a communication loss if it is not among the faults."""
     watch = data.communication_fault
     known = {fault.raw for fault in data.faults.codes}
     if watch and watch.fault is not None and data.faults.codes and watch.fault not in known:
@@ -186,7 +186,7 @@ def fault_of_the_line(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def written_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Words that the texts of control sources name by their numbers."""
+    """Yield words in texts of control sources that do not exist."""
     numbers = [parameter.number for parameter in data.parameters]
     known = {name for p in data.parameters for name in (p.code, p.number, p.number[3:])}
     forms = [form for start, form in WORD_FORMS.items() if any(start.match(n) for n in numbers)]

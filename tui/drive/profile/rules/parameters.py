@@ -1,4 +1,4 @@
-"""Rules for each parameter alone, and for what must be unique."""
+"""Rules for each single parameter, and for what must be unique."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..toml_lines import TomlPath
 
 
 def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Codes, quantities, ids and raw codes that occur twice."""
+    """Yield codes, quantities, ids and raw codes that occur twice."""
     yield from _twice(
         ((("parameters", n, "code"), p.code) for n, p in enumerate(data.parameters)),
         "code {} is already used by a parameter above; each needs its own.",
@@ -152,7 +152,7 @@ def _number_keys(key: str, names: dict[str, object] | dict[str, str]) -> Iterato
 
 
 def enumeration_keys(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Keys of shared names are raw values."""
+    """Yield keys of shared names that are not raw values."""
     for index, enumeration in enumerate(data.enumerations):
         for key, fault in _number_keys("values", enumeration.values):
             yield ("enumerations", index, key), f"enumeration {enumeration.id}: {fault}"
@@ -163,7 +163,7 @@ def enumeration_keys(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def fault_help(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Help belongs to a fault that is there, a fault has one, and what it looks at is there."""
+    """Yield help on a missing fault, a second help on a fault, and wrong references in it."""
     rows = data.faults.help
     for place, fault in help_findings(data, HelpData(faults=rows)) if rows else ():
         yield ("faults", "help", place[1]), fault

@@ -1,4 +1,4 @@
-"""Rules for registers: what lies where, and by which functions it can be had."""
+"""Rules for registers: their places, and the functions that read and write them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from ..schema import Parameter, ProfileData
 from ..toml_lines import TomlPath
 
 MOST_WRITTEN, MOST_WRITTEN_BY_23 = 123, 121
-"""Words that one request of Modbus can write: by function 16, and by function 23."""
+"""Most words that a Modbus request can write: by function 16, and by function 23."""
 
 
 def overlaps(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Two parameters in one register are fields of it that share no bit."""
+    """Yield parameters that share bits of a register."""
     held: dict[tuple[int, int], list[Parameter]] = {}
     for index, parameter in enumerate(data.parameters):
         long = parameter.type.endswith("32")
@@ -26,7 +26,7 @@ def overlaps(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
-    """Why two parameters cannot both lie at an address; empty where they can."""
+    """Return why two parameters cannot share an address; empty if they can."""
     if parameter.type.endswith("32") or other.type.endswith("32"):
         pair = parameter if parameter.type.endswith("32") else other
         return (
@@ -72,7 +72,10 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """A command needs no read before it: its word is nobody else's."""
+    """Yield commands that are only a part of a word.
+
+    Such a command would need a read before it, to keep the other bits.
+    """
     fields = {p.code for p in data.parameters if p.shift or p.mask != 0xFFFF}
     for index, chart in enumerate(data.charts):
         places: list[tuple[TomlPath, str]] = [(("charts", index, "command"), chart.command)]
@@ -89,7 +92,7 @@ def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def sizes(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """A request holds what a block or a function may take at once."""
+    """Yield blocks and functions that are larger than a request."""
     for index, function in enumerate(data.functions):
         if function.code == 23 and (function.max_write or 0) > MOST_WRITTEN_BY_23:
             yield (

@@ -1,8 +1,8 @@
-"""The form of a profile file: plain data, checked strictly while it is decoded.
+"""Form of a profile file: plain data, checked strictly while it is decoded.
 
-Every struct is one table of the TOML file. Raw values are words as the line carries them, scales
-are decimal strings so that no float ever comes between a word and its value. Each module holds a
-subject; other packages import from here.
+Every struct is one table of the TOML file. Raw values are words as on the wire. Scales are decimal
+strings, so that values are never rounded by a float. Each module has one subject; other packages
+import from here.
 """
 
 from __future__ import annotations
