@@ -40,7 +40,10 @@ def test_write_to_a_drive_of_another_family_exits_with_5(
     words = [text.format(line=atv71, folder=tmp_path) for text in COMMANDS[command]]
     before = [held(atv71, address) for address in (CMD, ACC)]
     output = refused(5, *words, "-p", "atv312")
-    assert "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312." in output
+    assert (
+        "Device 1 says it is ATV71HU15M3, Altivar 71: the profile Altivar 312 does not fit it."
+        in output
+    )
     assert "-p atv71" in output
     assert [held(atv71, address) for address in (CMD, ACC)] == before
 

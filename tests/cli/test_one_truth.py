@@ -15,11 +15,11 @@ ELSEWHERE = {
         "powerdrive", {"6.43": 0}, "6.43 is Terminals. In the panel t takes the control.",
     ),
     "Altivar 312 at its terminals": (
-        "atv312", {"LAC": 2, "Fr1": 1}, "the active reference channel 1 (Fr1) is Terminals.",
+        "atv312", {"LAC": 2, "Fr1": 1}, "the active Reference channel 1 (Fr1) is Terminals.",
     ),
     "Altivar 31, second channel": (
         "atv31", {"LAC": 2, "Fr1": 164, "Fr2": 1, "rFC": 97},
-        "the active reference channel 2 (Fr2) is Terminals.",
+        "the active Reference channel 2 (Fr2) is Terminals.",
     ),
 }  # fmt: skip
 

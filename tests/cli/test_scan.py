@@ -108,7 +108,7 @@ def test_silent_addresses_are_not_hits() -> None:
         done = invoked("scan", peer.path, "--addresses", "1-5", "--json")
     assert done.exit_code == 3
     assert not events(done.stdout, "hit")
-    assert "No drives found at addresses 1-5, 19200 8E1." in done.stderr
+    assert "No drives found at addresses 1-5. Tried 19200 8E1." in done.stderr
 
 
 def test_drive_with_line_timeout_is_named_before_first_request() -> None:

@@ -286,8 +286,8 @@ DEFECTS = (
     Defect(
         "stopping-before-the-frame",
         "tui/session/command/stop.py",
-        'self._say(session, Phase.SENDING, "stop waits for the line", ordered)',
-        'self._say(session, Phase.STOPPING, "stop waits for the line", ordered)',
+        "self._say(session, Phase.SENDING, STOP_WAITS, ordered)",
+        "self._say(session, Phase.STOPPING, STOP_WAITS, ordered)",
         "A row shows STOPPING although no stop was sent to its drive.",
         (f"{WAVES}::test_every_drive_gets_its_stop_word_before_any_read",),
     ),

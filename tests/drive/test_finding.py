@@ -11,7 +11,6 @@ from tui.drive.finding import (
     families_at,
     likely_settings,
     longest_turnaround,
-    names_text,
     presence_probes,
     silent_cost,
     wait_for_reply,
@@ -20,6 +19,7 @@ from tui.drive.finding import (
 )
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
+from tui.drive.sentences import all_of
 
 
 @pytest.fixture(scope="module")
@@ -53,9 +53,9 @@ def test_slow_settings_follow_all_likely_ones(
 
 
 def test_names_are_joined_in_a_sentence() -> None:
-    assert names_text([]) == "none"
-    assert names_text(["300"]) == "300"
-    assert names_text(["300", "600", "1200"]) == "300, 600 and 1200"
+    assert all_of([]) == "none"
+    assert all_of(["300"]) == "300"
+    assert all_of(["300", "600", "1200"]) == "300, 600 and 1200"
 
 
 def test_faster_of_two_equally_likely_settings_comes_first() -> None:

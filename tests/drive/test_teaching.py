@@ -87,7 +87,7 @@ def test_inconsistent_readings_give_no_scale_and_a_reason(
     assert lesson.kind is LessonKind.DISAGREES
     assert lesson.scale is None
     assert "no scale was learned" in lesson.text
-    assert "no usual scale" in lesson.text
+    assert "No usual scale" in lesson.text
 
 
 def test_reverse_run_shows_the_sign() -> None:

@@ -529,7 +529,7 @@ def test_stop_is_not_refused_for_a_wrong_profile() -> None:
         assert turns(simulation), started.stderr
         done = drivepanel("stop", line, "-p", "atv312")
         assert done.returncode == 0, done.stdout + done.stderr
-        assert "it is not an Altivar 312. It is stopped as Altivar 71." in done.stderr
+        assert "profile Altivar 312 does not fit it. It is stopped as Altivar 71." in done.stderr
         sent, stopped = done.stdout.splitlines()
         assert sent.startswith("Device 1: sent first 16#0000 to CMD, the stop of Altivar")
         assert sent.endswith("it says it is ATV71HU15M3.")
@@ -541,7 +541,7 @@ def test_stop_all_uses_each_identification_not_the_named_profile() -> None:
     with bench(DriveSpec("atv71", 1, run_hz=20.0)) as (simulation, line):
         done = drivepanel("stop", line, "--all", "--addresses", "1", "-p", "powerdrive")
         assert done.returncode == 0, done.stderr
-        assert "it is not a Powerdrive. It is stopped as Altivar 71." in done.stderr
+        assert "the profile Powerdrive does not fit it. It is stopped as Altivar 71." in done.stderr
         assert stands(simulation)
 
 

@@ -45,7 +45,7 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         assert made.speed > 2
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("FORWARD", "Runs since", "has exited", "T takes it over")
+        terminal.wait_for("FORWARD", "Running since", "has exited", "T takes it over")
         # not armed: nothing is taken over
         terminal.press("T")
         terminal.wait_for("Not armed")
@@ -69,7 +69,7 @@ def test_leaving_a_disowned_motor_asks_first(terminal_with: Start, second_termin
         os.kill(made.pid, signal.SIGKILL)
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("FORWARD", "Runs since")
+        terminal.wait_for("FORWARD", "Running since")
         terminal.press("q")
         terminal.wait_for("Leave the panel?", "30 s after")
         terminal.press("Escape")
@@ -85,13 +85,13 @@ def test_observed_standstill_withdraws_the_offer(
         os.kill(made.pid, signal.SIGKILL)
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("FORWARD", "Runs since")
+        terminal.wait_for("FORWARD", "Running since")
         terminal.press("Space")
         made.stopped()
         terminal.wait_for("STOPPED")
         made.simulation.drive(1).run(30.0)
         terminal.wait_for("FORWARD")
-        assert "Runs since" not in terminal.text()
+        assert "Running since" not in terminal.text()
 
 
 @pytest.mark.usefixtures("holder")
@@ -106,7 +106,7 @@ def test_motor_left_running_on_purpose_is_reported(
         made.ended()
         time.sleep(3)
         assert made.speed > 2
-        again(second_terminal, made.line).wait_for("Runs since", "left running on purpose")
+        again(second_terminal, made.line).wait_for("Running since", "left running on purpose")
 
 
 def test_panel_asks_if_start_cannot_be_recorded(terminal_with: Start, tmp_path: object) -> None:
@@ -146,7 +146,7 @@ class Killed(NamedTuple):
 
     @property
     def clause(self) -> str:
-        return f"started by run, process {self.pid}, which has exited; no program commands it"
+        return f"Started by run, process {self.pid}, which has exited. No program commands it."
 
 
 @pytest.fixture
@@ -172,16 +172,16 @@ def documents(*words: str) -> Any:
 def test_commands_show_a_motor_that_no_program_commands(killed: Killed) -> None:
     line = killed.line
     ways = f"Stop it: drivepanel stop {line} -d 1. Take it over: drivepanel {line} -d 1,"
-    assert f", {killed.clause}. {ways}" in drivepanel("status", line, "-d", "1").stdout
-    assert f", {killed.clause}. {ways}" in drivepanel("status", line, "--all").stdout
+    assert f" {killed.clause} {ways}" in drivepanel("status", line, "-d", "1").stdout
+    assert f" {killed.clause} {ways}" in drivepanel("status", line, "--all").stdout
     left = documents("status", line, "-d", "1")["left_behind"]
     facts = (left["program"], left["pid"], left["exited"], left["left_running"])
     assert facts == ("run", killed.pid, True, False)
     assert killed.clause in left["text"]
     assert documents("status", line, "-d", "2")["left_behind"] is None
     printed = drivepanel("lines").stdout
-    assert f"{line} device 1: may run since" in printed
-    assert f", {killed.clause}.\n  {ways}" in printed
+    assert f"{line} device 1: May be running since" in printed
+    assert f" {killed.clause}\n  {ways}" in printed
     (known,) = documents("lines")["left_behind"]
     assert (known["line"], known["device"], known["pid"]) == (line, 1, killed.pid)
     # stopped from the shell, it is a motor like any other again
@@ -224,7 +224,7 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
     terminal.wait_for("Signal path of the selected configuration")
     shows("Space stops it; T on Monitor takes it over.")
     terminal.press("m")
-    shows("1: Runs since", "Open it: Space stops it, T takes it over.")
+    shows("1: Running since", "Open it: Space stops it, T takes it over.")
     terminal.press("1")
     terminal.wait_for("no comma")
     goes_away("Open it:")

@@ -266,7 +266,7 @@ REFUSALS = [
     ("atv312", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("atv71", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("powerdrive", {"6.43": 0}, "forward", r"6\.43 is Terminals\. .*t takes the control"),
-    ("atv312", {"rFC": 97}, "forward", r"the active reference channel 2 \(Fr2\) is None"),
+    ("atv312", {"rFC": 97}, "forward", r"the active Reference channel 2 \(Fr2\) is None"),
     ("atv71", {}, "reset", r"No fault to reset: the drive is in the state "),
     ("atv31", {}, "take-control", r"no command 'take control'"),
 ]

@@ -127,7 +127,7 @@ def test_answering_drive_has_correct_wires() -> None:
 
 def test_first_suspects_are_settings_that_differ_from_factory() -> None:
     other = replace(heard(), link=SerialLink(PORT, 9600, "8E1"))
-    assert "this line has 9600 8E1" in of(other).steps[0]
+    assert "This line has 9600 8E1" in of(other).steps[0]
     assert of(heard()).steps[0].startswith("Address")
     assert any("--all-settings" in step for step in of(other).steps)
 
@@ -324,7 +324,7 @@ def test_error_counts_of_a_port_show_wrong_settings() -> None:
     errors = PortErrors(framing=3, parity=1, breaks=2, overruns=0)
     found = of(DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=2), errors=errors))
     assert found.rung == "wrong-settings"
-    assert "3 without a stop bit and 1 with a wrong parity and 2 breaks" in found.text
+    assert "3 without a stop bit, 1 with a wrong parity and 2 breaks" in found.text
 
 
 async def test_error_counts_are_read_from_the_line() -> None:
@@ -532,12 +532,12 @@ def steps_in_silence(family: str, device: int = 2) -> str:
         ("atv71", "Pins, RJ45, Modbus keypad port (front): 4 D1, 5 D0, 8 Common."),
         ("atv71", "Polarization: 450 to 650 ohm"),
         ("atv71", "Termination: 120 ohm 0.25 W"),
-        ("atv312", "Polarity: D0 is A or A', D(A), RD+/TD+ or L+; D1 is B"),
+        ("atv312", "Polarity: D0 is A or A', D(A), RD+/TD+ or L+. D1 is B"),
         ("atv312", "Changed settings take effect after a power cycle."),
         ("atv31", "Pins, RJ45, seen from the socket: 4 D1, 5 D0, 8 Common."),
         ("atv21", "Address: F802. At OFF (0) it does not answer."),
         ("proxidrive", "leaves the factory with 19200 8N2"),
-        ("proxidrive", "this line has 19200 8E1"),
+        ("proxidrive", "This line has 19200 8E1"),
         ("varmeca", "RX\\ and TX\\ are the inverted wires"),
         ("powerdrive", "screw terminals: 1 0 V common, 2 RX\\, 3 RX, 4 TX\\, 5 TX."),
         ("powerdrive", "not isolated, and shared with the keypad"),

@@ -179,7 +179,7 @@ async def test_request_is_shown_and_answered_by_a_person(bench: Bench) -> None:
     bench.facts.events.emit(ControlRequested(1, REMOTE))
     request = bench.handover.requests[1]
     assert request.program == REMOTE
-    assert any("requests this drive. Press G to reply" in text for text in bench.reported)
+    assert any("This drive is requested by" in text for text in bench.reported)
     bench.handover.answer(bench.handover.requests[1], yes=True)
     assert bench.handover.requests == {}
     assert bench.answers == [("reply", 1, REMOTE.id, True)]
@@ -356,8 +356,8 @@ async def test_arrivals_and_commanders_are_reported_once(bench: Bench) -> None:
     assert bench.reported == [
         "The line is shared with panel on pts/9 (pid 77).",
         "The line is shared with watch (pid 78).",
-        "Panel on pts/9 (pid 77) commands this drive now.",
-        "Watch (pid 78) has left the line.",
+        "The commander of this drive is now panel on pts/9 (pid 77).",
+        "The line is no longer shared with watch (pid 78).",
     ]
 
 
@@ -384,7 +384,7 @@ async def test_new_fleet_knows_the_current_commander() -> None:
     line.facts.set_programs((line.facts.me, REMOTE))
     line.facts.note_commander(1, REMOTE.id)
     fleet = Fleet(line, Journal())
-    assert any("commands this drive now" in event.text for event in fleet.events.events)
+    assert any("The commander of this drive is now" in event.text for event in fleet.events.events)
     fleet.handover.close()
 
 

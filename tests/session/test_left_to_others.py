@@ -13,7 +13,7 @@ from tui.session.starts.keeper import StartKeeper
 
 WATCH = Program("watch", "watch", 78)
 PANEL = Program("panel", "panel", 77, "", "pts/9")
-STOPPED = "the motor is stopped on its ramp within 10 s, unless"
+STOPPED = "The motor is stopped on its ramp within 10 s, unless"
 RUNS_ON = "the motor runs."
 
 
@@ -36,18 +36,17 @@ def test_text_is_empty_without_other_programs(on_purpose: bool) -> None:
 
 def test_other_programs_stop_a_motor_not_left_on_purpose() -> None:
     reported = peer_effect_text(on_a_line(WATCH, requested=False), on_purpose=False)
-    assert (
-        reported == f"Watch (pid 78) is on the line, too: {STOPPED} the line is opened here again."
-    )
+    alone = "The line is shared with watch (pid 78)."
+    assert reported == f"{alone} {STOPPED} the line is opened here again."
     reported = peer_effect_text(on_a_line(PANEL), on_purpose=False)
     assert f"{STOPPED} it is taken over there, or the line" in reported
     reported = peer_effect_text(on_a_line(WATCH, PANEL), on_purpose=False)
-    assert reported.startswith("Other programs are on the line, too: ")
+    assert reported.startswith("The line is shared with other programs. ")
 
 
 def test_motor_left_on_purpose_runs_while_it_is_polled() -> None:
     reported = peer_effect_text(on_a_line(WATCH), on_purpose=True)
-    assert reported == f"Watch (pid 78) polls this drive. As long as it does, {RUNS_ON}"
+    assert reported == f"As long as watch (pid 78) polls this drive, {RUNS_ON}"
     assert peer_effect_text(on_a_line(WATCH, requested=False), on_purpose=True) == ""
 
 
@@ -56,7 +55,7 @@ def test_closing_a_line_leaves_motors_running_if_chosen() -> None:
     assert session.starts is not None
     session.starts.leave(session)
     reported = peer_effect_text(session, on_purpose=False)
-    assert reported == f"Other programs on the line poll this drive. As long as they do, {RUNS_ON}"
+    assert reported == f"As long as other programs on the line poll this drive, {RUNS_ON}"
 
 
 def test_motor_of_another_source_is_not_stopped_by_other_programs() -> None:

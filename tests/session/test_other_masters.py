@@ -36,8 +36,8 @@ LATE = "late or repeated, device 4"
 def test_other_master_is_reported_with_its_requests() -> None:
     heard = overheard([came(READ, LATE), came(WRITE, "of device 7"), came(READ, LATE)], 0.0)
     assert heard.text == (
-        "Another master polls drives on this line. Address 4: read of register 3201 to 3208;"
-        " address 7: write of register 8501."
+        "Another master polls drives on this line. Address 4: read of register 3201 to 3208."
+        " Address 7: write of register 8501."
     )
 
 

@@ -27,7 +27,7 @@ NEVER = replace(AS_SET, bracket=Bracket(6.0), seen="", fault="")
 @pytest.mark.parametrize(
     ("result", "short", "parts"),
     [
-        (AS_SET, "tested: 2.0 s", ["Trips 2.0 s after", "freewheel", ", SLF1."]),
+        (AS_SET, "tested: 2.0 s", ["Trips 2.0 s after", "Set to: Freewheel.", "Fault: SLF1."]),
         (
             LATE,
             "tested: 5.2 s, NOT AS SET",
@@ -36,7 +36,7 @@ NEVER = replace(AS_SET, bracket=Bracket(6.0), seen="", fault="")
         (
             replace(AS_SET, fault="OHF, overheated"),
             "tested: 2.0 s, NOT AS SET",
-            [", OHF. NOT AS SET:", f"be {SLF}."],
+            ["Fault: OHF. NOT AS SET:", f"be {SLF}."],
         ),
         (
             replace(AS_SET, reaction=None, fault="", expected_fault=""),
@@ -48,7 +48,7 @@ NEVER = replace(AS_SET, bracket=Bracket(6.0), seen="", fault="")
             "tested: NO REACTION",
             [
                 "DID NOT REACT to 6.0 s",
-                "is set to 2 s, freewheel.",
+                "is set to 2 s, Freewheel.",
                 "does not stop a running motor",
             ],
         ),

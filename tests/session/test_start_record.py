@@ -32,8 +32,8 @@ RECORD = StartRecord(
 IDENTITY = DriveIdentity(
     2, "TELEMECANIQUE", "ATV71HU22N4", "0201", "MACHINE 4", "atv71", ("atv71", "atv61")
 )
-EXITED = "process 7, which has exited; no program commands it"
-TODAY = f"runs since 17:34, started by panel, {EXITED}"
+EXITED = "process 7, which has exited. No program commands it."
+TODAY = f"Running since 17:34. Started by panel, {EXITED}"
 
 
 def test_running_motor_is_reported() -> None:
@@ -45,34 +45,34 @@ def test_motor_at_standstill_is_not_reported() -> None:
 
 
 def test_unseen_motor_may_run() -> None:
-    assert offer(RECORD, IDENTITY, None, NOW) == f"may {TODAY.replace('runs', 'run')}"
+    assert offer(RECORD, IDENTITY, None, NOW) == f"May be r{TODAY[1:]}"
 
 
 def test_date_is_shown_unless_it_is_today() -> None:
     tomorrow = NOW + timedelta(days=1)
-    assert "since 2026-03-05 17:34, started by" in offer(RECORD, IDENTITY, True, tomorrow)
+    assert "since 2026-03-05 17:34. Started by" in offer(RECORD, IDENTITY, True, tomorrow)
 
 
 def test_time_is_shown_in_the_current_zone() -> None:
-    assert "since 15:34, started by" in offer(RECORD, IDENTITY, True, NOW.astimezone(UTC))
+    assert "since 15:34. Started by" in offer(RECORD, IDENTITY, True, NOW.astimezone(UTC))
 
 
 def test_motor_left_running_is_reported() -> None:
     text = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW)
-    assert text == f"runs since 17:34, left running on purpose by panel, {EXITED}"
+    assert text == f"Running since 17:34. Left running on purpose by panel, {EXITED}"
 
 
 def test_running_program_is_not_reported_as_ended() -> None:
     frozen = EXITED.replace("has exited", "does not answer on this line")
     text = offer(RECORD, IDENTITY, True, NOW, lives=True)
-    assert text == f"runs since 17:34, started by panel, {frozen}"
+    assert text == f"Running since 17:34. Started by panel, {frozen}"
     left = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW, lives=True)
-    assert left == f"runs since 17:34, left running on purpose by panel, {frozen}"
+    assert left == f"Running since 17:34. Left running on purpose by panel, {frozen}"
 
 
 def test_invalid_time_is_omitted() -> None:
     text = offer(replace(RECORD, wall="soon"), IDENTITY, True, NOW)
-    assert text == f"runs, started by panel, {EXITED}"
+    assert text == f"Running. Started by panel, {EXITED}"
 
 
 @pytest.mark.parametrize(

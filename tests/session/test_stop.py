@@ -17,7 +17,7 @@ from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
 from tui.drive.profile import library
-from tui.session.command.stop import Stopper
+from tui.session.command.stop import STOP_WAITS, Stopper
 from tui.session.command.stop_report import Phase, StopReport
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
@@ -247,7 +247,7 @@ def test_report_from_another_thread_is_kept(journal: Journal) -> None:
         clock = DriveSession(line, 1, profile).clock
         device = property(lambda session: report_other())
 
-    stopper._report(cast(DriveSession, Overtaken()), Phase.SENDING, "stop waits for the line", 1.0)
+    stopper._report(cast(DriveSession, Overtaken()), Phase.SENDING, STOP_WAITS, 1.0)
     assert len(kept) > 2
     assert kept == texts[:-1]
 

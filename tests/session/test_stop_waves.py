@@ -133,13 +133,14 @@ async def test_motor_run_by_terminals_is_not_reported_as_stopped(
     await wait_for(lambda: drive.motor.frequency > 5)
     session = DriveSession(line, 1, library.load("atv31"))
     await Reader(session).read(["ETA", "ETI", "LAC", "CHCF", "rFC", "Fr1"])
-    assert run_by_others(session).startswith("run by its terminals (Fr1)")
+    assert run_by_others(session).startswith("its command source is Terminals (Fr1)")
     stopper = Stopper(line, journal)
     stopper.stop([session])
     report = await ending(stopper, 1, Phase.UNHEEDED)
     assert report.since - report.time < 1.0, "long before it is seen that it runs on"
     assert report.text == (
-        f"{NOT_STOPPED}run by its terminals (Fr1), not by Modbus. Stop it there or at the machine."
+        f"{NOT_STOPPED}its command source is Terminals (Fr1), not Modbus. Stop it there or at the"
+        " machine."
     )
     assert not stopper.wait([session], 0.0).ended, "it is followed on"
     drive.set_input("LI1", "0")

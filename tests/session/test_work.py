@@ -172,7 +172,7 @@ async def test_stop_ends_the_current_task_and_the_queue(reported: Notified) -> N
     assert sorted(await reported.idle()) == ["a begun", "a cancelled", "a given up", "b given up"]
     assert reported.queue.outcome is not None
     assert reported.queue.outcome.kind is OutcomeKind.REFUSED
-    assert BY_STOP in reported.queue.outcome.text.lower()
+    assert reported.queue.outcome.text == BY_STOP
     assert isinstance(reported.queue.outcome.error, Stopped)
     assert (reported.queue.stops, reported.queue.stopped_by) == (1, "F12")
 

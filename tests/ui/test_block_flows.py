@@ -299,7 +299,7 @@ async def test_p_names_the_keys_that_write_the_suggestion(
         watched = block_editor(made).monitor
         await until(made.pilot, lambda: watched.latest.state.motion in AT_REST)  # type: ignore[union-attr]
         # the message of the stop would take the place of the next one
-        await message(made, "Stopped")
+        await message(made, "The motor is stopped")
         await made.pilot.press("p")
         await message(made, "Press a to arm, then w to write it.")
         await until(made.pilot, lambda: "Press a to arm, then w" in shown(made.app, "detail"))

@@ -415,7 +415,7 @@ async def test_stop_works_on_every_screen() -> None:
             assert "RUN REVERSE" not in shown(made.app, "message"), screen
             if "console" not in vars(made.app.screen):
                 # nothing of this screen tells of the drive, so the panel does
-                await until(made.pilot, lambda: "Stopped" in shown(made.app, "said"))
+                await until(made.pilot, lambda: "The motor is stopped" in shown(made.app, "said"))
             while not isinstance(made.app.screen, MonitorScreen):
                 await made.pilot.press("escape")
 
@@ -530,7 +530,7 @@ async def test_leaving_with_a_running_motor_asks_and_stops(key: str, turns: bool
         line.pace.others = {1: 0.1}
         await made.pilot.press("q")
         await until(made.pilot, lambda: isinstance(app.screen, Leave))
-        assert "Watch (pid 78) polls this drive" in str(
+        assert "As long as watch (pid 78) polls this drive" in str(
             app.screen.query_one("#follows", Static).render()
         )
         line.facts.set_programs((line.facts.me,))

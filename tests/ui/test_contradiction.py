@@ -23,7 +23,9 @@ async def test_drive_with_a_contradicting_profile_is_not_armed() -> None:
         field = app.connection.query_one("#profile", Input)
         field.value = "atv312"
         await pilot.press("s")
-        reported = "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312."
+        reported = (
+            "Device 1 says it is ATV71HU15M3, Altivar 71: the profile Altivar 312 does not fit it."
+        )
         await until(pilot, lambda: any(text.startswith(reported) for text in output(app)))
         way = "Not armed: the profile is not its own. Type atv71 beside Profile, then s."
         await until(pilot, lambda: way in shown(app, "about"))

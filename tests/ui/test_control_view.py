@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from tui.screens.control.view import LEFT_ROWS, left_lines
 
-LEFT = "Runs since 17:34, started by run, process 4711, which has exited; no program commands it."
+LEFT = (
+    "Running since 17:34. Started by run, process 4711, which has exited. No program commands it."
+)
 
 
 def test_motor_without_a_commander_is_shown_with_the_keys() -> None:

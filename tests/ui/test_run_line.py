@@ -267,7 +267,7 @@ async def test_run_line_shows_why_it_has_no_effect_and_what_to_do() -> None:
         before = writes(made.app)
         await made.pilot.press("enter")
         await until(made.pilot, lambda: "Esc cancel" not in output(made.app))
-        await made.message("The drive is not commanded by Modbus: active command channel")
+        await made.message("The drive is not commanded by Modbus: Active command channel")
         assert writes(made.app) == before
 
 

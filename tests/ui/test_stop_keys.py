@@ -287,7 +287,8 @@ async def test_error_after_a_stop_key_does_not_prevent_its_frame(
 async def test_not_stopped_message_is_never_covered() -> None:
     """Armed, in a question and on each size: who runs it and where to stop it, to the last word."""
     reported = (
-        "drive 1: run by its terminals (Fr1), not by Modbus. Stop it there or at the machine."
+        "drive 1: its command source is Terminals (Fr1), not Modbus. Stop it there or at the"
+        " machine."
     )
     async with bench("atv31", sets={"CHCF": 1, "Fr1": 1}) as made:
         made.drive().set_input("LI1", "1")

@@ -22,14 +22,29 @@ class LinkSyntaxError(LineError):
     """A typed link cannot be understood; the text shows the forms that can."""
 
 
+STOPPED_FIRST = "Not sent: a stop came after it."
+STOPPED_FIRST_BY = "Not sent: a stop came after it ({by})."
+
+
+def stopped_first_text(by: str) -> str:
+    """Return the refusal of a frame that was requested before a stop; `by` may be empty."""
+    return STOPPED_FIRST_BY.format(by=by) if by else STOPPED_FIRST
+
+
+PORT_IN_USE = "{path} is in use by {holder}. Close that program, or choose another port."
+PORT_IN_USE_BY_OTHER = (
+    "{path} is in use by another program. Close that program, or choose another port."
+)
+
+
 class PortBusy(LineError):
     """A serial port is held by another program; `holder` names it if the system knows it."""
 
     def __init__(self, path: str, holder: str | None = None) -> None:
         self.path = path
         self.holder = holder
-        who = f"in use by {holder}" if holder else "in use by another program"
-        super().__init__(f"{path} is {who}. Close that program, or choose another port.")
+        text = PORT_IN_USE if holder else PORT_IN_USE_BY_OTHER
+        super().__init__(text.format(path=path, holder=holder))
 
 
 class NotShared(LineError):
@@ -113,9 +128,17 @@ class ExchangeError(LineError):
         super().__init__(text)
 
 
-def _request_text(function: int, address: int) -> str:
-    return f"function {function}" + (f", register {address}" if function in _WITH_ADDRESS else "")
+def request_text(function: int, address: int | None) -> str:
+    """Return a request as a text for a sentence about it."""
+    if address is not None and function in _WITH_ADDRESS:
+        return f"function {function}, register {address}"
+    return f"function {function}"
 
+
+_WRONG_REPLY = "Device {device} sent an unexpected reply ({request})."
+_WRONG_REPLY_BECAUSE = "Device {device} sent an unexpected reply ({request}): {detail}."
+_REFUSED = "Device {device} refused {request} with exception {code}."
+_REFUSED_BECAUSE = "Device {device} refused {request} with exception {code}: {why}."
 
 _WITH_ADDRESS = frozenset({3, 4, 6, 16, 23})
 
@@ -134,9 +157,9 @@ class NoAnswer(ExchangeError):
     ) -> None:
         self.retry_in = retry_in
         self.detail = detail
-        text = detail or f"Device {device} did not answer ({_request_text(function, address)})."
+        text = detail or f"Device {device} did not answer ({request_text(function, address)})."
         if retry_in is not None:
-            text += f" Retrying in {retry_in:.1f} s."
+            text = f"{text} Retrying in {retry_in:.1f} s."
         super().__init__(device, function, address, text)
 
 
@@ -149,7 +172,7 @@ class ChecksumFault(ExchangeError):
         self.received = received
         self.detail = detail
         text = detail or (
-            f"The answer of device {device} was damaged ({_request_text(function, address)}). "
+            f"The answer of device {device} was damaged ({request_text(function, address)}). "
             "Check wiring, termination and the format of the line."
         )
         super().__init__(device, function, address, text)
@@ -163,9 +186,10 @@ class WrongReply(ExchangeError):
     ) -> None:
         self.received = received
         self.detail = detail
-        request = _request_text(function, address)
-        text = f"Device {device} sent an unexpected reply ({request})"
-        super().__init__(device, function, address, f"{text}: {detail}." if detail else f"{text}.")
+        text = _WRONG_REPLY_BECAUSE if detail else _WRONG_REPLY
+        request = request_text(function, address)
+        text = text.format(device=device, request=request, detail=detail)
+        super().__init__(device, function, address, text)
 
 
 class BytesSwapped(ExchangeError):
@@ -193,14 +217,11 @@ class DeviceException(ExchangeError):
         self.code = code
         self.meaning = meaning
         # a sentence from a profile already ends with a full stop
-        why = f": {meaning.rstrip('.')}" if meaning else ""
-        super().__init__(
-            device,
-            function,
-            address,
-            f"Device {device} refused {_request_text(function, address)} with exception"
-            f" {code}{why}.",
-        )
+        text = _REFUSED_BECAUSE if meaning else _REFUSED
+        request = request_text(function, address)
+        why = meaning.removesuffix(".")
+        text = text.format(device=device, request=request, code=code, why=why)
+        super().__init__(device, function, address, text)
 
 
 HOPELESS = (PortBusy, PortMissing, PortRefused, NotShared)

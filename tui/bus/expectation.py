@@ -45,7 +45,8 @@ class Expectation:
     def mismatch(self, pdu: bytes) -> str:
         """Why a whole frame is not the reply, in words."""
         if not pdu or pdu[0] != self.function:
-            return f"function {pdu[0] if pdu else 'none'} instead of {self.function}"
+            came = str(pdu[0]) if pdu else "none"
+            return f"function {came} instead of {self.function}"
         if self.length is not None and len(pdu) != self.length:
             return f"{len(pdu)} bytes instead of {self.length}"
         return f"{hex_text(pdu[1:6])} where {hex_text(self.prefix[1:])} was due"

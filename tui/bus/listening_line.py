@@ -15,6 +15,15 @@ from .share.place import Owner, OwnerLock, SharePlace, owner_of
 from .transport.ports import is_pseudo_terminal
 from .transport.serial_listening import ListeningPort, open_listening, others_at
 
+_HELD_BY = (
+    "drivepanel {program} has {path}, and a port that is listened to can have no other user."
+    " Frames (7) of a panel on this line shows what goes over it."
+)
+_HELD = (
+    "Another drivepanel has {path}, and a port that is listened to can have no other user."
+    " Frames (7) of a panel on this line shows what goes over it."
+)
+
 
 class ListeningLine:
     """The port of a line, for this program alone, and open for reading only.
@@ -77,11 +86,9 @@ class ListeningLine:
             if self._lock.take() or (owner is not None and ends_unneeded(owner, self._lock)):
                 self._lock.tell(Owner(VERSION, self._program, ""))
                 return
-            who = f"drivepanel {owner.program.text}" if owner is not None else "another drivepanel"
-            raise NotShared(
-                f"{who} has {self.link.path}, and a port that is listened to can have no other"
-                " user. Frames (7) of a panel on this line shows what goes over it."
-            )
+            text = _HELD_BY if owner is not None else _HELD
+            program = owner.program.text if owner is not None else ""
+            raise NotShared(text.format(program=program, path=self.link.path))
 
     def _give_back(self) -> None:
         if self._lock is not None:

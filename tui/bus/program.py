@@ -58,5 +58,5 @@ class Program(msgspec.Struct, frozen=True):
     @property
     def text(self) -> str:
         """Name of the program for people: `panel on pts/3 (pid 812)`."""
-        where = f" on {readable(self.where, LONGEST_NAME)}" if self.where else ""
-        return f"{readable(self.name, LONGEST_NAME)}{where} (pid {self.pid})"
+        name, where = readable(self.name, LONGEST_NAME), readable(self.where, LONGEST_NAME)
+        return f"{name} on {where} (pid {self.pid})" if where else f"{name} (pid {self.pid})"

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from .bounds import MOST_NOTICE, MOST_TEXT
+from .errors import stopped_first_text
 from .keep_alive import KeepAlives
 from .leases import WriteLeases
 from .line_events import (
@@ -273,8 +274,7 @@ class SharedState:
         is True if the request writes registers.
         """
         if stamp != self.stops.stamp(device):
-            by = self.stops.by.get(device, "")
-            return f"Not sent: a stop came after it{f' ({by})' if by else ''}."
+            return stopped_first_text(self.stops.by.get(device, ""))
         for commander in (device,) if device else tuple(self.commanders):
             holder = self.commanders.get(commander)
             if holder is not None and holder != program:

@@ -152,8 +152,9 @@ def no_such_command(name: str) -> str:
     from difflib import get_close_matches
 
     near = get_close_matches(name.lower(), COMMANDS, n=1)
-    intended = f", did you mean {near[0]}?" if near else ", and no LINE."
-    return f"{name}: no such command{intended}"
+    if near:
+        return f"{name}: no such command, did you mean {near[0]}?"
+    return f"{name}: no such command, and no LINE."
 
 
 @click.group(

@@ -71,6 +71,10 @@ def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str
     return ""
 
 
+NOT_BY_LINE = "The drive is not commanded by Modbus: {name} ({code}) is {value}."
+NOT_BY_LINE_NOW = "The drive is not commanded by Modbus: the active {name} ({code}) is {value}."
+
+
 def _by_others(profile: Profile, found: Channel) -> CommandBlocked:
     """Return the reason if another source commands the drive, or the commander is unknown."""
     word = found.parameter
@@ -80,9 +84,8 @@ def _by_others(profile: Profile, found: Channel) -> CommandBlocked:
         return CommandBlocked(
             f"{word.code}, which selects the source of the drive's commands, was not read."
         )
-    active = "the active " if found.is_several else ""
-    name = f"{active}{word.name[0].lower()}{word.name[1:]} ({word.code})"
-    text = f"The drive is not commanded by Modbus: {name} is {found.text}."
+    text = NOT_BY_LINE_NOW if found.is_several else NOT_BY_LINE
+    text = text.format(name=word.name, code=word.code, value=found.text)
     way: UnblockHint = "set-up" if profile.data.control_sources else ""
     return CommandBlocked(text, profile.data.channels.remedy, way, by_channel=True)
 

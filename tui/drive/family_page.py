@@ -111,13 +111,21 @@ def _warnings(data: ProfileData) -> Iterator[PageRow]:
             yield PageRow("!", text, "", True)
 
 
+_WAIT = {
+    (True, False): "{opening.minutes} minutes",
+    (True, True): "{opening.minutes} minutes; DC bus below {opening.below_volts} V, measured",
+    (False, False): "unknown",
+    (False, True): "unknown; DC bus below {opening.below_volts} V, measured",
+}
+"""By whether the minutes and the voltage are known."""
+
+
 def _opening(data: ProfileData) -> Iterator[PageRow]:
     opening = data.wiring.opening
     if opening is None:
         return
-    wait = f"{opening.minutes} minutes" if opening.minutes else "unknown"
-    below = f"; DC bus below {opening.below_volts} V, measured" if opening.below_volts else ""
-    yield PageRow("Wait", wait + below, SURENESS[opening.confidence], True)
+    text = _WAIT[bool(opening.minutes), bool(opening.below_volts)].format(opening=opening)
+    yield PageRow("Wait", text, SURENESS[opening.confidence], True)
     if opening.note:
         yield PageRow("", opening.note)
 
@@ -172,8 +180,9 @@ def _silence(data: ProfileData) -> Iterator[PageRow]:
     if watch is None:
         yield PageRow("", "No available document describes the reaction.", "", True)
         return
-    off = f"; {watch.off} switches it off" if watch.off is not None else ""
-    yield PageRow("Timeout", f"{watch.timeout}{off}")
+    code = watch.timeout
+    text = code if watch.off is None else f"{code}; {watch.off} switches it off"
+    yield PageRow("Timeout", text)
     yield PageRow("Starts", watch.starts)
     for reaction in watch.reactions:
         head = f"{watch.reaction} = {reaction.raw}" if watch.reaction else reaction.name

@@ -131,12 +131,6 @@ def families_at(profiles: Iterable[Profile], settings: Iterable[LineSetting]) ->
     return found
 
 
-def names_text(names: Sequence[str]) -> str:
-    """Join names for a sentence, with `and` before the last."""
-    *first, last = names or ("none",)
-    return f"{', '.join(first)} and {last}" if first else last
-
-
 def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
     """Return the share of each value: FACTORY_SHARE for the factory setting, the rest evenly."""
     others = [
@@ -180,14 +174,21 @@ def watching_families(profiles: Iterable[Profile]) -> list[WatchingFamily]:
     return sorted(found, key=lambda family: not family.sure)
 
 
+_WATCHING = {
+    (True, False): "Drives of these families start their communication timeout with the first"
+    " request, and react when polling stops: {sure}.",
+    (True, True): "Drives of these families start their communication timeout with the first"
+    " request, and react when polling stops: {sure}, and perhaps {likely}.",
+    (False, True): "Drives of these families may start their communication timeout with the first"
+    " request, and react when polling stops: {likely}.",
+}
+"""By whether there are documented and likely families."""
+
+
 def watching_text(families: Sequence[WatchingFamily]) -> str:
     """Return a sentence that names the families that react when polling stops; empty for none."""
     sure = ", ".join(f"{family.name} ({family.code})" for family in families if family.sure)
     likely = ", ".join(f"{family.name} ({family.code})" for family in families if not family.sure)
     if not families:
         return ""
-    parts = [part for part in (sure, f"and perhaps {likely}" if likely else "") if part]
-    return (
-        "Drives of these families start their communication timeout with the first request, and"
-        f" react when polling stops: {', '.join(parts)}."
-    )
+    return _WATCHING[bool(sure), bool(likely)].format(sure=sure, likely=likely)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
+from tui.drive.sentences import sentence
+
 from .profile.profile import Profile
 from .profile.schema import FaultHelp, HelpConfidence, Hint, ResetWay
 from .reset_text import MAY_START
@@ -110,8 +112,9 @@ def advice(profile: Profile, hint: Hint, raws: Mapping[str, int], *, latest: boo
             parameter = profile[row.parameter]
             value = shown(profile, parameter, known[row.parameter], known)
             measured = parameter.access == "r" and bool(parameter.unit)
-            word = "not now" if measured and row.parameter not in stored else "ruled out"
-            reason = f"{word}, {row.parameter} {value.text} {value.unit}".rstrip()
+            reason = f"ruled out, {row.parameter} {value.text} {value.unit}".rstrip()
+            if measured and row.parameter not in stored:
+                reason = f"not now, {row.parameter} {value.text} {value.unit}".rstrip()
             excluded.append(ExcludedAdvice(text, row.parameter, reason))
     return FaultAdvice(
         probable,
@@ -158,4 +161,4 @@ def hint_markdown(
 
 
 def _joined(texts: Sequence[str]) -> str:
-    return "; ".join(texts) + "."
+    return sentence("; ".join(texts))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 
+from tui.drive.sentences import all_of, any_of
+
 from .channel import channel_codes
 from .chart import state_of
 from .errors import DriveError
@@ -61,7 +63,7 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | No
         if all(when.holds(raws) for when in order.when):
             return order
     if fitting:
-        needed = " or ".join(_conditions(order) for order in fitting)
+        needed = any_of([_conditions(order) for order in fitting])
         raise OrderRefused(f"{fitting[0].name} requires {needed}.")
     names = {s.id: s.name for s in chart.states}
     allowed = ", ".join(dict.fromkeys(names[s] for order in same for s in order.states))
@@ -168,8 +170,8 @@ def _ways_to_stop(profile: Profile) -> tuple[object, ...]:
 
 
 def _conditions(order: Order) -> str:
-    return " and ".join(
-        f"{when.parameter} = {' or '.join(map(str, when.values))}" for when in order.when
+    return all_of(
+        [f"{when.parameter} = {any_of([str(v) for v in when.values])}" for when in order.when]
     )
 
 

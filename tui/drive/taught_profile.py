@@ -55,8 +55,9 @@ def why_no_reference(family: Profile, code: str, taught: Mapping[str, TaughtScal
     """Return why a parameter cannot take the reference; empty if it can after confirmation."""
     if reference_of(family, code) is None:
         known = ", ".join(reference.parameter for reference in family.data.teachable_references)
-        may = f"Use {known}." if known else f"{family.name} has no such parameter."
-        return f"{code} cannot take the reference. {may}"
+        if known:
+            return f"{code} cannot take the reference. Use {known}."
+        return f"{code} cannot take the reference. {family.name} has no such parameter."
     if (scale := taught.get(code)) is None:
         return f"The scale of {code} was not learned yet. Teach it first."
     if scale.unit not in REFERENCE_UNITS:

@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from enum import StrEnum
 
+from tui.drive.sentences import all_of, any_of
+
 from .errors import ValueRefused
 
 LOOKS_KEPT = 8
@@ -155,6 +157,10 @@ def taught_by(looks: Sequence[DisplayLook]) -> TaughtScale | None:
     return found[0] if len(found) == 1 else None
 
 
+_FIRST_LOOK = "{code}: {look}. Enter another value of the display."
+_SAME_LOOK = "{code}: {look} again. Enter another value of the display."
+
+
 def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson:
     """Evaluate one more reading of a parameter."""
     known, looks = taught_by(before), _with(before, look)
@@ -164,14 +170,15 @@ def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson
     if scale is not None:
         kind = LessonKind.TAUGHT if known is None else LessonKind.AGREES
         seen = ", ".join(item.text for item in looks)
-        return Lesson(kind, looks, f"{code}: {scale.text} ({seen}).{_sign_text(scale)}", scale)
+        text = f"{code}: {scale.text} ({seen}). {_sign_text(scale)}"
+        return Lesson(kind, looks, text, scale)
     if len({item.word for item in looks}) < 2:
         kind = LessonKind.SAME if before else LessonKind.FIRST
-        again = " again" if before else ""
-        text = f"{code}: {look.text}{again}. Enter another value of the display."
+        text = _SAME_LOOK if before else _FIRST_LOOK
+        text = text.format(code=code, look=look.text)
         return Lesson(kind, looks, text)
-    fits = " or ".join(
-        dict.fromkeys(f"{taught_scale.scale:f}" for taught_scale in scales_that_fit(looks))
+    fits = any_of(
+        [*dict.fromkeys(f"{taught_scale.scale:f}" for taught_scale in scales_that_fit(looks))]
     )
     text = f"{code}: 1 count is {fits}. Enter a larger value of the display ({look.text})."
     return Lesson(LessonKind.UNSURE, looks, text)
@@ -184,14 +191,14 @@ def _contradiction(
     alone = scales_that_fit([look])
     kept = (look,) if alone else ()
     if not alone:
-        why = f"no usual scale gives {look.shown:f} for raw {look.word}"
+        why = f"No usual scale gives {look.shown:f} for raw {look.word}."
     else:
-        why = f"no usual scale fits {' and '.join(item.text for item in (*before[-2:], look))}"
+        why = f"No usual scale fits {all_of([item.text for item in (*before[-2:], look)])}."
     check = "Check that the display shows this parameter, and that its value is steady."
     if known is not None:
-        text = f"{code} is shown raw again, because {why}. Before: {known.text}. {check}"
+        text = f"{code} is shown raw again. {why} Before: {known.text}. {check}"
         return Lesson(LessonKind.ENDED, kept, text)
-    text = f"{code}: no scale was learned, because {why}. {check}"
+    text = f"{code}: no scale was learned. {why} {check}"
     return Lesson(LessonKind.DISAGREES, kept, text)
 
 
@@ -228,10 +235,10 @@ def _unit_of(looks: Iterable[DisplayLook]) -> str | None:
 def _sign_text(scale: TaughtScale) -> str:
     if scale.signed is None:
         return (
-            " The sign is unknown: from raw 32768 on, it is shown raw until you enter such a value"
+            "The sign is unknown: from raw 32768 on, it is shown raw until you enter such a value"
             " of the display."
         )
-    return " It has a sign." if scale.signed else " It has no sign."
+    return "It has a sign." if scale.signed else "It has no sign."
 
 
 __all__ = [

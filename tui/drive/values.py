@@ -191,10 +191,9 @@ def encode(
         raw = _hexadecimal(parameter, typed)
     if raw is None:
         if scale is None:
-            raise ValueRefused(
-                f"{parameter.code} cannot be written: its scale depends on"
-                f" {_scale_source(parameter)}, which was not read."
-            )
+            by = parameter.scale_by
+            text = _SCALE_NOT_READ if by else _OTHER_SCALE_NOT_READ
+            raise ValueRefused(text.format(code=parameter.code, source=by.parameter if by else ""))
         number = _number(parameter, typed, names)
         counts = number / scale
         raw = int(counts.to_integral_value(ROUND_HALF_UP))
@@ -205,16 +204,31 @@ def encode(
     return Conversion(raw, rounded, lossy)
 
 
+_SCALE_NOT_READ = "{code} cannot be written: its scale depends on {source}, which was not read."
+_OTHER_SCALE_NOT_READ = (
+    "{code} cannot be written: its scale depends on another parameter, which was not read."
+)
+_OUT_OF_RANGE = "{code}: {value} is out of range, {low} to {high}."
+_OUT_OF_DOUBTED_RANGE = (
+    "{code}: {value} is out of range, {low} to {high}; no document of this family states these"
+    " limits."
+)
+
+
 def check_raw(
     parameter: Parameter, raw: int, names: Mapping[int, str], scale: Decimal | None
 ) -> None:
     """Raise ValueRefused unless the profile lets the parameter hold this raw value."""
     low, high = raw_range(parameter)
     if not low <= raw <= high and raw not in names:
-        limits = f"{_plain(parameter, low, scale)} to {_plain(parameter, high, scale)}"
+        text = _OUT_OF_DOUBTED_RANGE if _has_doubted_limits(parameter) else _OUT_OF_RANGE
         raise ValueRefused(
-            f"{parameter.code}: {_plain(parameter, raw, scale)} is out of range, "
-            f"{limits}{_doubt(parameter)}."
+            text.format(
+                code=parameter.code,
+                value=_plain(parameter, raw, scale),
+                low=_plain(parameter, low, scale),
+                high=_plain(parameter, high, scale),
+            )
         )
     to_words(parameter, raw, held=0)
     if is_enumeration(parameter) and raw not in names:
@@ -231,15 +245,10 @@ def _plain(parameter: Parameter, raw: int, scale: Decimal | None) -> str:
     return f"{engineering(raw, scale):f} {parameter.unit}".rstrip()
 
 
-def _doubt(parameter: Parameter) -> str:
-    """Return a remark if no document of the family states the limits; else empty."""
+def _has_doubted_limits(parameter: Parameter) -> bool:
+    """Return True if no document of the family states the limits."""
     grounds = parameter.limit_grounds
-    weak = grounds is not None and grounds.confidence in ("analogy", "unverified")
-    return "; no document of this family states these limits" if weak else ""
-
-
-def _scale_source(parameter: Parameter) -> str:
-    return parameter.scale_by.parameter if parameter.scale_by else "another parameter"
+    return grounds is not None and grounds.confidence in ("analogy", "unverified")
 
 
 def _hexadecimal(parameter: Parameter, typed: str) -> int:
@@ -269,8 +278,10 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
         number = Decimal("NaN")
     if not number.is_finite():
         choice = ", ".join(list(names.values())[:4])
-        wanted = f"one of {choice}" if choice else f"a number in {parameter.unit or 'counts'}"
-        raise ValueRefused(f"{parameter.code}: {typed!r} is not {wanted}.")
+        if choice:
+            raise ValueRefused(f"{parameter.code}: {typed!r} is not one of {choice}.")
+        unit = parameter.unit or "counts"
+        raise ValueRefused(f"{parameter.code}: {typed!r} is not a number in {unit}.")
     if number and not -LONGEST_NUMBER <= number.adjusted() <= LONGEST_NUMBER:
         # its digits alone would fill the screen, or the memory
         raise ValueRefused(f"{parameter.code}: {typed[:40]!r} is out of range.")

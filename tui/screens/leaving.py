@@ -90,7 +90,7 @@ class Leaving(Panel):
         from tui.session.monitor.timeout import names_of
 
         return [
-            f"{names_of([console.session])}: {left[0].lower()}{left[1:]} {STOP_OR_TAKE_OVER}"
+            f"{names_of([console.session])}: {left} {STOP_OR_TAKE_OVER}"
             for console in fleet.consoles
             if (left := fleet.left_behind(console))
         ]

@@ -289,8 +289,7 @@ class Fleet:
         seen = console.latest is not None or device in self.line_watch.looks
         if starts is None or not seen:
             return ""
-        text = starts.offered(console.session, runs=self.line_watch.turns(device))
-        return f"{text[0].upper()}{text[1:]}." if text else ""
+        return starts.offered(console.session, runs=self.line_watch.turns(device))
 
     @property
     def stamp(self) -> Stamp:

@@ -21,6 +21,7 @@ from pathlib import Path
 from typing import Literal
 
 from tui.drive.plain import escaped_json
+from tui.drive.sentences import counted
 
 from .journal_file import JournalFile
 from .paths import state_folder
@@ -152,7 +153,9 @@ class Journal:
         if not why:
             return ""
         reported = f"The journal cannot be written: {why}: {self.path}."
-        return reported + (f" {lost} entries lost." if lost else "")
+        if not lost:
+            return reported
+        return f"{reported} {counted(lost, '1 entry lost.', '{count} entries lost.')}"
 
     def add(self, entry: Entry, *, sent: bool = True) -> None:
         """Add an entry; return immediately and never raise, whatever the disk does.

@@ -111,7 +111,8 @@ class _Report:
         """Return the commander of the drive and the source of its reference."""
         raws = self.values.raws
         source = source_in_force(self.profile, raws)
-        lines = [f"- Configuration: {source.name if source else 'none of those in the manual'}"]
+        name = source.name if source else "none of those in the manual"
+        lines = [f"- Configuration: {name}"]
         reported = read_chart(self.profile, raws)
         lines += [f"- Commanded by: {reported.channel}"] if reported.channel else []
         lines += [f"- Reference from: {reported.reference}"] if reported.reference else []
@@ -154,13 +155,13 @@ class _Report:
         raw = self.values.raws.get(watch.timeout)
         reported = self.text(watch.timeout)
         if raw is not None and raw == watch.off and reported.casefold() != "off":
-            reported += ", the watch is off"
+            reported = f"{reported}, the watch is off"
         lines.append(f"- Timeout ({watch.timeout}): {reported}")
         if watch.reaction:
             held = self.values.raws.get(watch.reaction)
             known = next((r for r in watch.reactions if r.raw == held), None)
-            does = f": {known.does}" if known else ""
-            lines.append(f"- Reaction ({watch.reaction}): {self.text(watch.reaction)}{does}")
+            row = f"- Reaction ({watch.reaction}): {self.text(watch.reaction)}"
+            lines.append(f"{row}: {known.does}" if known else row)
         elif watch.reactions:
             lines.append(f"- Reaction: {watch.reactions[0].does}")
         lines.append(f"- The watch begins: {watch.starts}")

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from tui.bus.api import LineStatus, LineWorker, ModbusLine
-from tui.bus.errors import LineError, Superseded
+from tui.bus.errors import LineError, Superseded, stopped_first_text
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
@@ -26,7 +26,8 @@ log = logging.getLogger(__name__)
 
 MOST_WAITING = 4
 """Tasks that may wait while another one is in progress."""
-BY_STOP = "ended by a stop"
+BY_STOP = "Ended by a stop."
+DROPPED_BY_STOP = "Not done: ended by a stop."
 STOPPED_DISARMS = "Stopped: no longer armed."
 
 
@@ -34,7 +35,7 @@ class Stopped(OrderRefused):
     """A stop has ended this work; no more of its frames are sent."""
 
     def __init__(self, by: str = "") -> None:
-        super().__init__(f"Not sent: a stop came after it{f' ({by})' if by else ''}.")
+        super().__init__(stopped_first_text(by))
 
 
 class OutcomeKind(StrEnum):
@@ -192,8 +193,8 @@ class WorkQueue:
         if worker is not None:
             worker.cancel()
         # a worker that has not begun yet drops nothing
-        if self.drop(BY_STOP):
-            self.tell(OutcomeKind.REFUSED, f"Not done: {BY_STOP}.", Stopped(by))
+        if self.drop("ended by a stop"):
+            self.tell(OutcomeKind.REFUSED, DROPPED_BY_STOP, Stopped(by))
 
     def drop(self, why: str) -> bool:
         """Drop the tasks that wait; return True if there were any."""
@@ -237,7 +238,7 @@ class WorkQueue:
             log.exception("work on device %s failed", self._device)
             self._fail(task, turn, error, f"It failed ({type(error).__name__}: {error}).")
         except asyncio.CancelledError:
-            text = f"{BY_STOP[0].upper()}{BY_STOP[1:]}.{_given_up(task)}"
+            text = " ".join([BY_STOP, *_given_up(task)])
             self.tell(OutcomeKind.REFUSED, text, Stopped(self.stopped_by))
             raise
         finally:
@@ -246,11 +247,11 @@ class WorkQueue:
     def _fail(self, task: Task, turn: object, error: Exception, text: str) -> None:
         # tasks that wait after a stop belong to another worker
         dropped = turn is self._turn and self.drop("a command before it was refused")
-        rest = " The commands after it were canceled." if dropped else ""
-        self.tell(OutcomeKind.REFUSED, f"{text}{rest}{_given_up(task)}", error)
+        rest = ["The commands after it were canceled."] if dropped else []
+        self.tell(OutcomeKind.REFUSED, " ".join([text, *rest, *_given_up(task)]), error)
 
 
-def _given_up(task: Task) -> str:
-    """End a task undone; return its text about that with a leading space, or an empty string."""
+def _given_up(task: Task) -> list[str]:
+    """End a task undone; return its sentences about that."""
     message = task.given_up() if task.given_up is not None else None
-    return f" {message}" if message else ""
+    return [message] if message else []

@@ -75,7 +75,8 @@ def with_alt(character: str) -> Named:
     if isinstance(value, str):
         return _character_to_key(value), value
     plain = character_name(character)
-    return f"alt+{plain[0] if plain else 'unknown'}", None
+    key = plain[0] if plain else "unknown"
+    return f"alt+{key}", None
 
 
 @lru_cache(maxsize=512)

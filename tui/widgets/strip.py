@@ -14,6 +14,7 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.drive.plain import plain
+from tui.drive.sentences import counted
 
 from .drawing import armed_text, cut, cut_at_word, short
 from .palette import (
@@ -174,7 +175,7 @@ def _right(view: StripView, width: int) -> Text:
     off_record = "J!" if narrow and drive is not None else "NO JOURNAL "
     narrow = narrow or view.off_record
     if view.faults:
-        count = f"■ {view.faults} fault{'' if view.faults == 1 else 's'}"
+        count = counted(view.faults, "■ 1 fault", "■ {count} faults")
         count = f"■{view.faults}" if narrow else count
         style = FAULT_BLOCK if view.unseen else FAULT
         text.append(f" {count} " if view.unseen and not narrow else count, style)

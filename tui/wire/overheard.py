@@ -14,6 +14,15 @@ _HEAD = 6
 """Bytes of device, function, first register and count or value."""
 
 
+_TEXTS = {
+    (True, False): "read of {kind} {at}",
+    (True, True): "read of {kind} {at} to {last}",
+    (False, False): "write of {kind} {at}",
+    (False, True): "write of {kind} {at} to {last}",
+}
+"""By whether it reads, and whether it names several words."""
+
+
 class OverheardRequest(NamedTuple):
     """A request of another master; `register` and `words` are 0 if it names none."""
 
@@ -25,11 +34,10 @@ class OverheardRequest(NamedTuple):
     @property
     def text(self) -> str:
         """Request in few words."""
-        several = f" to {self.register + self.words - 1}" if self.words > 1 else ""
-        if self.function in READS:
-            return f"read of {READS[self.function]} {self.register}{several}"
-        if self.function in WRITES:
-            return f"write of {WRITES[self.function]} {self.register}{several}"
+        kind = READS.get(self.function) or WRITES.get(self.function, "")
+        if kind:
+            text = _TEXTS[self.function in READS, self.words > 1]
+            return text.format(kind=kind, at=self.register, last=self.register + self.words - 1)
         if self.function in (IDENTIFY, REPORT_ID):
             return f"its identity (function {self.function})"
         return f"function {self.function}"

@@ -15,6 +15,7 @@ from ..errors import (
     LineError,
     NoAnswer,
     WrongReply,
+    request_text,
 )
 from ..limits import STANDARD_EXCEPTIONS
 from ..master import ExchangeResult, MonotonicClock, Piece, ResultKind
@@ -236,11 +237,13 @@ class Outcomes:
 
     def _no_answer(self, job: Job, detail: str) -> str:
         request = job.request
-        what = f"function {request.function}"
-        if request.register:
-            what += f", register {request.register}"
-        text = f"Device {request.device} did not answer ({what})"
-        return with_fate(job, f"{text}: {detail}." if detail else f"{text}.")
+        text = _SILENT_BECAUSE if detail else _SILENT
+        what = request_text(request.function, request.register or None)
+        return with_fate(job, text.format(device=request.device, request=what, detail=detail))
+
+
+_SILENT = "Device {device} did not answer ({request})."
+_SILENT_BECAUSE = "Device {device} did not answer ({request}): {detail}."
 
 
 def with_fate(job: Job, text: str) -> str:

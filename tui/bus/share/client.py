@@ -99,7 +99,8 @@ class NewsHeard:
         """The programs that share the line, and its settings if they differ from the requested
         ones."""
         names = ", ".join(other.text for other in self._inside.facts.others)
-        return f"{f'Shared with {names}.' if names else ''}{self.note}".strip()
+        shared = [f"Shared with {names}."] if names else []
+        return " ".join([*shared, self.note] if self.note else shared)
 
 
 class OwnerAway(Exception):
@@ -201,7 +202,7 @@ class ShareClient:
         if not isinstance(message, Welcome):
             raise NotShared(f"{self._owner.program.text} owns the line and does not share it.")
         if not message.requested:
-            self._news.note = f" It is open as {message.label}."
+            self._news.note = f"It is open as {message.label}."
         self._gone, self.taken_in = message.gone, True
         self._heartbeat = Heartbeat(self._owner.socket, self._inside.facts.me.id)
         self._inside.pace.carrier = self._polls

@@ -22,6 +22,10 @@ from ..shared.sets import (
 STANDARD_OUTPUT = Path("-")
 
 
+_PARAMETERS = "{file}: {count} parameters of {name}"
+_SETTINGS = "{file}: {count} settings of {name}"
+
+
 @command("Back up a drive's settings to a file.", statuses=ON_LINE)
 @line_argument
 @file_argument
@@ -58,8 +62,8 @@ def backup(target: Target, file: Path, force: bool, everything: bool, as_json: b
         say(text.removesuffix("\n"))
     else:
         write_down(file, text, force=force)
-        what = "parameters" if everything else "settings"
-        messages.tell(f"{file}: {len(values.raws)} {what} of {session.profile.name}")
+        text = _PARAMETERS if everything else _SETTINGS
+        messages.tell(text.format(file=file, count=len(values.raws), name=session.profile.name))
     complain_absent(messages, values.absent)
     if as_json:
         print_json(

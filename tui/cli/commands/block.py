@@ -225,8 +225,8 @@ def _cut_short(sent: dict[str, bool]) -> str:
     """Report what Ctrl-C or a signal left; by slot, whether the drive was seen to hold it."""
     held = ", ".join(slot for slot, taken in sent.items() if taken) or "none"
     open_yet = ", ".join(slot for slot, taken in sent.items() if not taken)
-    rest = f" {open_yet} may have been written too: look at it." if open_yet else ""
-    return f"Slots written and verified: {held}.{rest}"
+    text = f"Slots written and verified: {held}."
+    return f"{text} {open_yet} may have been written too: look at it." if open_yet else text
 
 
 def _judged(
@@ -291,7 +291,7 @@ async def plans_of(
         found = await mapper.slots(block)
         plan = assignment(block, found)
         if plan is None:
-            raise MappingError(f"Not every slot of {block.name.lower()} could be read.")
+            raise MappingError(f"Not every slot of the block {block.name} could be read.")
         held |= plan.slots
         if wanted.action == "factory":
             plan = factory(profile, block)

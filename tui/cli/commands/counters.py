@@ -116,9 +116,8 @@ async def _look(watch: CounterWatch) -> None:
 
 async def _reset(watch: CounterWatch) -> None:
     if not watch.can_reset_drive:
-        why = "the line is read-only" if watch.session.line.read_only else "it has no such command"
-        reported = f"The counters of device {watch.session.device} are not reset: {why}."
-        raise Failure(reported, REFUSED_HERE)
+        text = _READ_ONLY if watch.session.line.read_only else _NO_RESET
+        raise Failure(text.format(device=watch.session.device), REFUSED_HERE)
     journal = journal_document()
     try:
         await watch.reset_drive(journal)
@@ -126,13 +125,27 @@ async def _reset(watch: CounterWatch) -> None:
         await asyncio.to_thread(close_journal, journal)
 
 
+_READ_ONLY = "The counters of device {device} are not reset: the line is read-only."
+_NO_RESET = "The counters of device {device} are not reset: it has no such command."
+_BY_OWNER = "{owner}, which owns the line; for {seconds:.1f} s"
+_BY_THIS = "this program; for {seconds:.1f} s"
+_EXACTLY = (
+    "{last.frames} frames, {last.damaged} with a wrong checksum;"
+    " {since.frames} and {since.damaged} since the first look"
+)
+_AT_LEAST = (
+    "{last.frames} frames, {last.damaged} or more with a wrong checksum;"
+    " {since.frames} and {since.damaged} since the first look"
+)
+
+
 def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
     """Yield the counts as titles with their texts."""
     from tui.session.counters.compare import bars
 
     ours = found.since
-    by = f"{found.counted_by}, which owns the line" if found.counted_by else "this program"
-    yield "Counted by", f"{by}; for {found.seconds:.1f} s"
+    by = _BY_OWNER if found.counted_by else _BY_THIS
+    yield "Counted by", by.format(owner=found.counted_by, seconds=found.seconds)
     yield "Sent", f"{ours.requests} frames, {ours.bytes_out} bytes, {ours.repeats} of them repeats"
     yield "Answered", f"{ours.replies}, {ours.bytes_in} bytes"
     lost = f"{ours.timeouts} timeouts, {ours.checksum} damaged, {ours.wrong} unexpected"
@@ -140,26 +153,20 @@ def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
     yield "Last minute", _minute_text(found)
     yield "Refused", ", ".join(f"exception {c}: {n}" for c, n in ours.exceptions.items()) or "0"
     if found.line_load is not None and found.device_load is not None:
-        share = f"{found.device_load:.0%} with this drive"
-        yield "Load of the line", f"{found.line_load:.0%}, {share}"
+        yield "Load of the line", f"{found.line_load:.0%}, {found.device_load:.0%} with this drive"
     seen = [f"{bar.label}: {bar.count}" for bar in bars(ours.turnarounds) if bar.count]
     yield "Turnaround", ", ".join(seen) or "-----"
     for name, comparison in found.drive:
-        errors = f"{comparison.last.damaged}{' or more' if comparison.last.saturated else ''}"
-        reported = f"{comparison.last.frames} frames, {errors} with a wrong checksum"
-        meanwhile = f"{comparison.frames} and {comparison.damaged} since the first look"
-        yield name.capitalize(), f"{reported}; {meanwhile}"
+        last, text = comparison.last, _AT_LEAST if comparison.last.saturated else _EXACTLY
+        yield name.capitalize(), text.format(last=last, since=comparison)
     if found.trouble:
         yield "Drive", found.trouble
 
 
 def _minute_text(found: CountersNow) -> str:
     line, own = found.line_minute, found.total.minute
-    texts = (
-        f"{name} {minute.good} of {awaited} replies good"
-        for name, minute, awaited in (
-            ("line", line, line.replies),
-            ("this drive", own, own.replies + own.silent),
-        )
+    return (
+        f"line {line.good} of {line.replies} replies good;"
+        f" this drive {own.good} of {own.replies + own.silent} replies good;"
+        f" {line.foreign} foreign frames, {line.strays} strays"
     )
-    return f"{'; '.join(texts)}; {line.foreign} foreign frames, {line.strays} strays"

@@ -130,7 +130,9 @@ def held_text(session: DriveSession, found: Timeout) -> str:
         return f"{who}: its communication timeout cannot be read; it is polled often."
     if (watch := found.watch) is None:
         return f"{who}: its communication timeout is off or does not exist; it is polled anyway."
-    does = watch.reaction.does.rstrip(".") if watch.reaction else "its own reaction follows"
+    if watch.reaction is None:
+        return f"{who}: kept alive within its communication timeout of {watch.timeout:g} s."
+    does = watch.reaction.does.removesuffix(".")
     return f"{who}: kept alive within its communication timeout of {watch.timeout:g} s ({does})."
 
 

@@ -72,19 +72,20 @@ def lines(as_json: bool) -> None:
             drive = "" if line.device is None else f"device {line.device}"
             say_row(NAMED_COLUMNS, (line.name, line.line, drive, line.profile or ""))
         for key, mark in memory.lines.items():
-            say(f"Remembered: {key}{f' ({mark.adapter})' if mark.adapter else ''}")
+            say(f"Remembered: {key} ({mark.adapter})" if mark.adapter else f"Remembered: {key}")
             for device, drive_mark in mark.drives.items():
                 say_row(DRIVE_COLUMNS, (str(device), drive_mark.text))
         for owner, look in held:
             minute = look.minute if look is not None else None
-            good = "" if minute is None or not minute.replies else (
-                f" {minute.good} of {minute.replies} replies good in the last minute."
-            )  # fmt: skip
-            say(f"Open: {owner.line}, held by {owner.program.text}.{good}")
+            text = f"Open: {owner.line}, held by {owner.program.text}."
+            if minute is not None and minute.replies:
+                good = f"{minute.good} of {minute.replies} replies good in the last minute."
+                text = f"{text} {good}"
+            say(text)
             for client in look.clients if look is not None else ():
                 say(f"  {client.share:>4.0%} of the line: {client.program} (pid {client.pid})")
         for motor in left:
-            say(f"{motor.record.line} device {motor.record.device}: {motor.text}.")
+            say(f"{motor.record.line} device {motor.record.device}: {motor.text}")
             say(f"  {motor.advice(motor.record.line)}", to_copy=True)
     for fault in faults:
         say(f"drivepanel: {fault}", err=True)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tui.drive.plain import plain
+from tui.drive.sentences import counted
 
 from ..shared.completion import complete_profile
 from ..shared.options import json_option
@@ -114,8 +115,8 @@ def check_files(files: list[Path], as_json: bool) -> None:
 
         if as_json:
             raise click.exceptions.Exit(USAGE)
-        count_text = f"{len(faults)} fault{'s' if len(faults) > 1 else ''}"
-        raise Failure("\n".join((f"{count_text} found:", *faults)), USAGE)
+        head = counted(len(faults), "1 fault found:", "{count} faults found:")
+        raise Failure("\n".join((head, *faults)), USAGE)
 
 
 def _tell_folder(as_json: bool) -> None:
@@ -237,6 +238,19 @@ def _show_wiring(profile: Profile, as_json: bool) -> None:
         say(f"{line.head}{line.text}".rstrip())
 
 
+_FUNCTIONS = {
+    (False, False): "{of.code:>2}  {of.name}",
+    (True, False): "{of.code:>2}  {of.name}, at most {of.max_read} words read, past that {above}",
+    (False, True): "{of.code:>2}  {of.name}, at most {of.max_write} words written, past that"
+    " {above}",
+    (True, True): "{of.code:>2}  {of.name}, at most {of.max_read} words read and {of.max_write}"
+    " words written, past that {above}",
+}
+"""By whether a function has a limit of the words that it reads and writes."""
+_ABOVE_LIMIT = {True: "no answer", False: "an exception"}
+"""By whether the drive is silent above the limit."""
+
+
 def _show(profile: Profile, as_json: bool) -> None:
     from ..shared.output import console, print_json
 
@@ -256,14 +270,9 @@ def _show(profile: Profile, as_json: bool) -> None:
         f"{profile.vendor} {profile.name}, factory line {link.baud} {link.format}", highlight=False
     )
     for function in profile.data.functions:
-        past = "no answer" if function.past_limit == "silence" else "an exception"
-        limits = [
-            f"{words} words {what}"
-            for what, words in (("read", function.max_read), ("written", function.max_write))
-            if words
-        ]
-        most = f", at most {' and '.join(limits)}, past that {past}" if limits else ""
-        screen.print(f"  function {function.code:>2}  {function.name}{most}", highlight=False)
+        text = _FUNCTIONS[bool(function.max_read), bool(function.max_write)]
+        text = text.format(of=function, above=_ABOVE_LIMIT[function.past_limit == "silence"])
+        screen.print(f"  function {text}", highlight=False)
     rows = []
     for parameter in profile.parameters:
         code, number, wire = notations(parameter)

@@ -41,6 +41,8 @@ ON_THE_RUN = (
     "The motor turns while it is proved: it does what is set, and may coast; a hoist falls. It is"
     " stopped when the proof ends."
 )
+_IN_FAULT = "It is in the fault {fault} now; `drivepanel reset` with --arm ends that."
+_IN_UNNAMED_FAULT = "It is in a fault now; `drivepanel reset` with --arm ends that."
 STOPPED_AFTER_PROOF_WITHIN = 60.0
 """Seconds that a motor may take to its standstill after a proof on the run."""
 
@@ -138,8 +140,8 @@ def _tell(fields: DriveFields, result: ProofResult, reset: bool, as_json: bool) 
     if result.fault and not reset:
         from tui.session.proof.result import UNNAMED_FAULT
 
-        now = f"the fault {result.fault}" if result.fault != UNNAMED_FAULT else UNNAMED_FAULT
-        say(f"It is in {now} now; `drivepanel reset` with --arm ends that.")
+        text = _IN_UNNAMED_FAULT if result.fault == UNNAMED_FAULT else _IN_FAULT
+        say(text.format(fault=result.fault))
 
 
 def prove_document(fields: DriveFields, result: ProofResult, *, was_reset: bool) -> ProveDocument:

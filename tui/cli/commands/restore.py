@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, TypedDict
 
 import click
 
+from tui.drive.sentences import first_of, sentence
+
 from ..shared.drive_commands import (
     arm_option,
     close_journal,
@@ -216,23 +218,22 @@ def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> No
         if item.reason != "no setting":
             left.setdefault(item.text, []).append(item)
     for text, same in left.items():
-        values = [f"{item.code} {item.new}".rstrip() for item in same]
         if len(same) > ALIKE:
-            values = [f"{len(same)}", ", ".join(item.code for item in same)]
-        messages.tell(
-            f"leave  {' '.join(values) if len(same) > ALIKE else ', '.join(values)}: {text}"
-        )
+            values = f"{len(same)} {', '.join(item.code for item in same)}"
+        else:
+            values = ", ".join(f"{item.code} {item.new}".rstrip() for item in same)
+        messages.tell(f"leave  {values}: {text}")
     if plan.same_rating is False and not plan.across:
         messages.tell("The set is of another model or rating than this drive.")
     if plan.across:
         messages.tell(
             "The set is of another family: common quantities are carried over in their units."
         )
-    stop = " Some of it needs the motor stopped." if plan.needs_stop else ""
-    messages.tell(
+    counts = (
         f"{plan.count('write')} to write, {plan.count('equal')} equal already,"
-        f" {plan.count('skip')} left out.{stop}"
+        f" {plan.count('skip')} left out."
     )
+    messages.tell(f"{counts} Some of it needs the motor stopped." if plan.needs_stop else counts)
 
 
 async def _restore(
@@ -265,8 +266,8 @@ async def _restore(
             messages.tell(await save_to_eeprom(session, journal, permit))
         say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
-        done_text = f"Wrote {written}, all verified" if written else "Nothing written"
-        messages.tell(f"{done_text}; {len(done.left)} not written.")
+        text = _WROTE if written else _WROTE_NOTHING
+        messages.tell(text.format(count=written, left=len(done.left)))
         if done.unseen:
             messages.complain(f"Not all of it was seen again: {done.unseen}")
         if not done.complete:
@@ -279,18 +280,21 @@ async def _restore(
     return found, DONE if done.complete else status_of_results(done.results) or DRIVE_REFUSED
 
 
+_WROTE = "Wrote {count}, all verified; {left} not written."
+_WROTE_NOTHING = "Nothing written; {left} not written."
+
+
 def say_plan_left_out(plan: RestorePlan, messages: Messages) -> None:
     """Report omitted settings by reason, and each rounding, as a person wrote these values by
     hand."""
     reasons: dict[str, list[str]] = {}
     for item in plan.items_of_kind("skip"):
         if item.reason == "rounding":
-            messages.tell(f"left out: {item.text.rstrip('.')}. Use --round to write it anyway.")
+            messages.tell(f"left out: {sentence(item.text)} Use --round to write it anyway.")
         elif item.reason != "no setting":
             reasons.setdefault(item.reason, []).append(item.code)
     for item in plan.items_of_kind("write"):
         if item.text:
             messages.tell(item.text)
     for reason, codes in reasons.items():
-        more = f" and {len(codes) - CODES_NAMED} more" if len(codes) > CODES_NAMED else ""
-        messages.tell(f"left out, {reason}: {', '.join(codes[:CODES_NAMED])}{more}")
+        messages.tell(f"left out, {reason}: {first_of(codes, CODES_NAMED)}")

@@ -273,7 +273,8 @@ class RunCommand:
             )
         except Failure as failure:
             way = way_to_take(self.console.session)
-            raise Failure(failure.message + way, failure.status) from failure
+            text = f"{failure.message} {way}" if way else failure.message
+            raise Failure(text, failure.status) from failure
         if options.reference is not None:
             self.telling.report("reference", commander.given.reference_text)
         self.telling.report("order", outcome.text)

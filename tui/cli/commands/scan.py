@@ -120,15 +120,25 @@ async def _prepare(scan: Scan, *, all_settings: bool) -> None:
     )
 
 
+_FOUND = {
+    (True, 0): "No drives found at addresses {addresses}.",
+    (True, 1): "1 drive found at addresses {addresses}.",
+    (True, 2): "{count} drives found at addresses {addresses}.",
+    (False, 0): "No drives found at addresses {addresses}, not all of which were asked.",
+    (False, 1): "1 drive found at addresses {addresses}, not all of which were asked.",
+    (False, 2): "{count} drives found at addresses {addresses}, not all of which were asked.",
+}
+"""By whether all addresses were asked, and the count up to 2."""
+
+
 def _end(scans: list[Scan], addresses: str) -> str:
     """Report the end as JSON, if requested; the result, in a sentence."""
     if not scans:
         return "Nothing was sent."
     (scan,) = scans
     count = len(scan.hits)
-    drives = f"{count or 'No'} drive{'' if count == 1 else 's'} found"
-    early = "" if scan.done else ", not all of which were asked"
-    text = f"{drives} at addresses {addresses}{early}{_settings_text(scan)}."
+    found = _FOUND[scan.done, min(count, 2)].format(count=count, addresses=addresses)
+    text = " ".join([found, *_settings_text(scan)])
 
     def document(line_text: str) -> ScanEndDocument:
         from ..documents.drive_documents import LineSettingField, ScanEndDocument
@@ -149,10 +159,11 @@ def _end(scans: list[Scan], addresses: str) -> str:
     return " ".join((text, *scan.remarks))
 
 
-def _settings_text(scan: Scan) -> str:
+def _settings_text(scan: Scan) -> list[str]:
+    """Return a sentence about the settings that were tried, if any."""
     if len(scan.settings) > 1:
-        return f", {len(scan.tried)} of {len(scan.settings)} settings tried"
-    return f", {scan.tried[0]}" if scan.tried else ""
+        return [f"Tried {len(scan.tried)} of {len(scan.settings)} settings."]
+    return [f"Tried {scan.tried[0]}."] if scan.tried else []
 
 
 def _hint(scan: Scan) -> str:

@@ -231,14 +231,19 @@ def _reached(places: ServedAt, wish: GatewayWish | None) -> str:
     return "; ".join(parts)
 
 
+_MAY = {
+    (False, False): "reads only",
+    (True, False): "reads and writes of {codes}",
+    (False, True): "reads and commands",
+    (True, True): "reads, writes of {codes} and commands",
+}
+"""Rights of clients, by whether they may write and command."""
+
+
 def _may(wish: GatewayWish) -> str:
     """Return the rights of clients in a few words."""
-    may = ["reads"]
-    if wish.rules.writes:
-        may.append(f"writes of {', '.join(sorted(wish.rules.writes))}")
-    if wish.rules.commands:
-        may.append("commands")
-    return " and ".join([", ".join(may[:-1]), may[-1]]) if may[1:] else "reads only"
+    text = _MAY[bool(wish.rules.writes), bool(wish.rules.commands)]
+    return text.format(codes=", ".join(sorted(wish.rules.writes)))
 
 
 def _ready_document(texts: list[str], places: ServedAt, wish: GatewayWish | None) -> ServeReady:

@@ -177,13 +177,17 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
     # a drive without the requested kind of stop gets the ramp stop, and the result says so
     way: OrderId = order if order in INSTEAD or has_order(session, order) else "stop"
     stopper.stop([session], way, by="drivepanel stop")
-    who = f"Device {session.device}" + ("" if session.guessed else f", {found.name}")
+    who = f"Device {session.device}, {found.name}"
+    if session.guessed:
+        who = f"Device {session.device}"
     report = await ended(stopper, session.device, lambda text: complain(f"{who}: {text}"))
     if telling.as_json:
         await PolledDrive(session, "", goes_on=True).learn()
     if report.phase is Phase.STOPPED:
-        lacks = "" if way == order else f" (it has no {order}: ramp stop)"
-        telling.stopped(session, f"{who}: {report.text}{lacks}.")
+        text = f"{who}: {report.text}."
+        if way != order:
+            text = f"{who}: {report.text} (it has no {order}: ramp stop)."
+        telling.stopped(session, text)
         await asyncio.to_thread(forget_start, session)
         return 0
     status = await _why(session)

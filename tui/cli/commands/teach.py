@@ -83,7 +83,7 @@ def teach(
         else:
             if forget:
                 known = teacher.forget(found)
-                text = f"{found}: {'shown raw again' if known else 'was not taught'}."
+                text = f"{found}: shown raw again." if known else f"{found}: was not taught."
             elif reference:
                 text = _confirm(teacher, found)
             else:
@@ -156,6 +156,10 @@ def _tell_change(teacher: Teacher, text: str, *, as_json: bool) -> None:
         say(text)
 
 
+_ROW = "{name}: {scale} ({looks})"
+_REFERENCE_ROW = "{name}: {scale}, takes the reference ({looks})"
+
+
 def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:
     """Report taught scales and begun lessons, of one parameter or of all."""
     from ..documents.setting_documents import TaughtDocument
@@ -178,11 +182,11 @@ def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:
         scale = teacher.scales.get(code)
         what = scale.text if scale is not None else "not known yet"
         seen = ", ".join(look.text for look in teacher.looks(code))
-        takes = ", takes the reference" if code == teacher.reference else ""
-        text = f"{teacher.family[code].name}: {what}{takes} ({seen})"
+        row = _REFERENCE_ROW if code == teacher.reference else _ROW
+        text = row.format(name=teacher.family[code].name, scale=what, looks=seen)
         say_row(titled(7), (code, text))
     if not rows:
-        say(f"{f'Of {only} nothing' if only else 'Nothing'} is taught.")
+        say(f"Of {only} nothing is taught." if only else "Nothing is taught.")
 
 
 def _tell_trouble(teacher: Teacher) -> None:

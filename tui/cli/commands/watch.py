@@ -188,8 +188,9 @@ class CyclesSeen:
     def at_the_end(self, wish: CsvOptions) -> str:
         """Return the summary in a sentence."""
         count = wish.file.rows if wish.file is not None else 0
-        rows = f"; {count} rows written to {wish.path}" if wish.path is not None else ""
-        return f"Ended by Ctrl-C after {self.cycles} cycles{rows}."
+        if wish.path is None:
+            return f"Ended by Ctrl-C after {self.cycles} cycles."
+        return f"Ended by Ctrl-C after {self.cycles} cycles; {count} rows written to {wish.path}."
 
 
 def _watched(session: DriveSession, line: LineWish, codes: Sequence[str]) -> WatchedDrive:

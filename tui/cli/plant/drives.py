@@ -33,6 +33,8 @@ SILENT_FOR_LONG = 60.0
 PLANT_LOOK_INTERVAL = 2.0
 RATE_LOOK_INTERVAL = 10.0
 """Seconds between two looks whether the line keeps the wished cycle time."""
+_LINE_FULL = "{name}: the line is full. A cycle takes up to {slowest:.1f} s."
+_CYCLE_KEPT = "{name}: the cycle time is as requested again."
 TIMEOUT_READ_AGAIN = 20.0
 """Seconds after which a drive's communication timeout is read again."""
 
@@ -89,9 +91,8 @@ class PlantLine:
             slowest = max((cycle.period for cycle in cycles if not cycle.error), default=0.0)
             if full != any(cycle.too_slow for cycle in cycles if not cycle.error):
                 full = not full
-                text = f"the line is full. A cycle takes up to {slowest:.1f} s."
-                text = text if full else "the cycle time is as requested again."
-                say(f"drivepanel: {self.name}: {text}", err=True)
+                text = _LINE_FULL if full else _CYCLE_KEPT
+                say(f"drivepanel: {text.format(name=self.name, slowest=slowest)}", err=True)
 
     async def _first_looks(self) -> None:
         for drive in self.drives:

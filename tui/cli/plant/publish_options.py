@@ -46,7 +46,7 @@ def check_names(broker: Broker, names: list[str]) -> None:
     try:
         line_topics(broker.root, names)
     except ValueError as error:
-        raise click.UsageError(f"{str(error)[0].upper()}{str(error)[1:]}.") from error
+        raise click.UsageError(str(error)) from error
 
 
 def check_drives(lines: Sequence[ServedLine]) -> None:

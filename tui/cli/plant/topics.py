@@ -80,7 +80,7 @@ def line_topics(root: str, names: Iterable[str]) -> Mapping[str, str]:
     for name in names:
         topic = f"{root}/{level(name)}"
         if topic in found.values():
-            raise ValueError(f"two lines would have the topic {topic}: give them different names")
+            raise ValueError(f"Two lines would have the topic {topic}: give them different names.")
         found[name] = topic
     return found
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tui.drive.finding import LineSetting, WatchingFamily, watching_text
 from tui.drive.plain import plain
+from tui.drive.sentences import any_of
 from tui.session.connect.search import LEFT_ALONE
 
 from ..shared.rows import Column, say_row
@@ -55,12 +56,21 @@ class Progress:
     @property
     def text(self) -> str:
         """In one line."""
-        where = f"{self.setting}: " if self.setting else ""
-        more = f", {self.settings_left} more settings" if self.settings_left else ""
-        left = max(1, round(self.left))
-        return (
-            f"{where}{self.requested} of {self.of} asked, {self.found} found{more}, {left} s left"
-        )
+        text = _PROGRESS[self.setting is not None, bool(self.settings_left)]
+        return text.format(setting=self.setting, at=self, left=max(1, round(self.left)))
+
+
+_PROGRESS = {
+    (True, True): "{setting}: {at.requested} of {at.of} asked, {at.found} found,"
+    " {at.settings_left} more settings, {left} s left",
+    (True, False): "{setting}: {at.requested} of {at.of} asked, {at.found} found, {left} s left",
+    (False, True): "{at.requested} of {at.of} asked, {at.found} found,"
+    " {at.settings_left} more settings, {left} s left",
+    (False, False): "{at.requested} of {at.of} asked, {at.found} found, {left} s left",
+}
+"""By whether the settings of the line are known, and whether others follow."""
+_TAKEN = "The address is taken."
+_TAKEN_TWICE = "The address is taken, perhaps twice."
 
 
 class ScanTelling:
@@ -126,8 +136,8 @@ class ScanTelling:
                     text=result.error,
                 )
             )
-        twice = "" if result.by == LEFT_ALONE else ", perhaps twice"
-        self.note(f"{result.error} The address is taken{twice}.")
+        taken = _TAKEN if result.by == LEFT_ALONE else _TAKEN_TWICE
+        self.note(f"{result.error} {taken}")
 
     def progress(self, progress: Progress) -> None:
         """Show the progress in one line that is overwritten; on a terminal only."""
@@ -195,9 +205,8 @@ def hit_text(hit: Hit) -> str:
         return plain("  ".join(part for part in parts if part))
     if hit.sure == "likely":
         fits = [names[candidate] for candidate in who.candidates]
-        vendors = " or ".join(dict.fromkeys(vendor for _, vendor in fits))
-        *first, last = (name for name, _ in fits)
-        families = f"{', '.join(first)} or {last}" if first else last
+        vendors = any_of([*dict.fromkeys(vendor for _, vendor in fits)])
+        families = any_of([name for name, _ in fits])
         return plain(f"likely {vendors}: {families}")
     if stated := " ".join(part for part in (who.vendor, who.reference, who.version_text) if part):
         return plain(f"{stated}: no profile fits")

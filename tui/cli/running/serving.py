@@ -170,10 +170,8 @@ async def _gateway(gates: Sequence[GatewayLine], wish: GatewayWish) -> AsyncIter
     finally:
         await server.close()
         for reported in await gateway.close():
-            say(
-                f"drivepanel: {reported.head if reported.failed else 'Stopped:'} {reported.text}",
-                err=True,
-            )
+            head = reported.head if reported.failed else "Stopped:"
+            say(f"drivepanel: {head} {reported.text}", err=True)
 
 
 def _noting(opened: OpenLine) -> Note:
@@ -183,17 +181,22 @@ def _noting(opened: OpenLine) -> Note:
     return note
 
 
+_OPEN_TO_READ = (
+    "Modbus TCP has no password: anyone who can reach {place} can read these drives and stop their"
+    " motors. Restrict access by a firewall."
+)
+_OPEN_AS_ALLOWED = (
+    "Modbus TCP has no password: anyone who can reach {place} can read these drives and stop their"
+    " motors, and do what the options allow. Restrict access by a firewall."
+)
+
+
 def _warn(wish: GatewayWish, host: str, port: int) -> None:
     """Warn if other computers can reach the gateway."""
     if is_loopback(host):
         return
-    more = ", and do what the options allow" if _allows(wish.rules) else ""
-    say(
-        f"drivepanel: Modbus TCP has no password: anyone who can reach"
-        f" {written_host_port(host, port)} can read these drives and stop their motors{more}."
-        " Restrict access by a firewall.",
-        err=True,
-    )
+    text = _OPEN_AS_ALLOWED if _allows(wish.rules) else _OPEN_TO_READ
+    say(f"drivepanel: {text.format(place=written_host_port(host, port))}", err=True)
 
 
 def _allows(rules: GatewayRules) -> bool:

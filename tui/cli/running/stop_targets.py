@@ -93,11 +93,12 @@ async def first_stopped(wish: StopWish, device: int, before: StartRecord | None)
         silent, says = error, "it does not say what it is"
     wish.telling.sent_first(device, first.sent, says)
     if silent is not None and not first.answered:
-        hint = "" if typed else " -p sends a stop word blind."
+        hint = [] if typed else ["-p sends a stop word blind."]
         # past a frozen owner of the line: what keeps the stop from the drive
         away = opened.line.state.status is LineStatus.LOST
-        why = f" {opened.line.state.reason}" if away else ""
-        text = f"NOT STOPPED: Device {device} did not answer. Stop it at the machine.{hint}{why}"
+        why = [opened.line.state.reason] if away else []
+        text = f"NOT STOPPED: Device {device} did not answer. Stop it at the machine."
+        text = " ".join([text, *hint, *why])
         raise NoAnswer(device, silent.function, silent.address, text)
     found = await asyncio.to_thread(_by_what_is_known, wish, identity, before, first)
     if found is None and first.sent:

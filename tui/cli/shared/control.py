@@ -46,7 +46,7 @@ def control_row(session: DriveSession) -> list[tuple[str, str]]:
         return [("Control", f"not taken by the line: {TAKES}")]
     if not found.can_give_back:
         return []
-    return [("Control", f"{'taken by the line: ' if found.taken else ''}{GIVES_BACK}")]
+    return [("Control", f"taken by the line: {GIVES_BACK}" if found.taken else GIVES_BACK)]
 
 
 def way_to_take(session: DriveSession) -> str:
@@ -54,4 +54,4 @@ def way_to_take(session: DriveSession) -> str:
     found = taking_of(session)
     if found is None or not found.can_take or found.taken is not False:
         return ""
-    return f" {TAKE_OPTION} takes the control first."
+    return f"{TAKE_OPTION} takes the control first."

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from tui.drive.orders import OrderRefused
+from tui.drive.sentences import counted
 from tui.session.work import Outcome, OutcomeKind
 
 from .errors import REFUSED_HERE, Failure, note_journal, status_of
@@ -47,12 +48,18 @@ def journal_document() -> Journal:
     return journal
 
 
+_UNKEPT = ("1 entry is not in the journal.", "{count} entries are not in the journal.")
+_UNKEPT_SILENT_DISK = (
+    "1 entry is not in the journal: the disk does not answer: {path}.",
+    "{count} entries are not in the journal: the disk does not answer: {path}.",
+)
+
+
 def close_journal(journal: Journal) -> None:
     """Close the journal, and say what is not on record: nothing is lost unsaid."""
     if not journal.close() and (unkept := journal.unkept):
-        why = "" if journal.trouble else f": the disk does not answer: {journal.path}"
-        entries = "1 entry is" if unkept == 1 else f"{unkept} entries are"
-        complain(f"{entries} not in the journal{why}.")
+        texts = _UNKEPT if journal.trouble else _UNKEPT_SILENT_DISK
+        complain(counted(unkept, *texts, path=journal.path))
 
 
 @asynccontextmanager

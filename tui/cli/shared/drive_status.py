@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tui.drive.sentences import sentence
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.patience import patience
 
@@ -109,8 +110,9 @@ def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str,
 def _text(reading: Reading | None) -> str:
     if reading is None or reading.raw is None or reading.quality != "good":
         return "-----"
-    mark = " taught" if reading.value is not None and reading.value.taught else ""
-    return f"{reading.text} {reading.unit}".strip() + mark
+    text = f"{reading.text} {reading.unit}".strip()
+    is_taught = reading.value is not None and reading.value.taught
+    return f"{text} taught" if is_taught else text
 
 
 def fault_text(state: DriveState) -> str:
@@ -327,9 +329,9 @@ def watch_text(watch: TimeoutWatch | None) -> str:
         return "none: it goes on without communication"
     if watch.reaction is not None and not watch.acts:
         return f"off ({watch.reaction.name}): it goes on without communication"
-    reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
-    begins = "" if watch.active else " It begins with the first command or reference."
-    return f"{watch.timeout:g} s, then: {reaction.rstrip('.')}.{begins}"
+    reaction = sentence(watch.reaction.does) if watch.reaction else "Its own reaction follows."
+    text = f"{watch.timeout:g} s, then: {reaction}"
+    return text if watch.active else f"{text} It begins with the first command or reference."
 
 
 async def read_until(

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import click
 
+from tui.drive.sentences import first_of
+
 from .say import say
 
 if TYPE_CHECKING:
@@ -148,8 +150,7 @@ def _writes_text() -> str:
     journals: list[Journal] = [] if context is None else context.meta.get(_JOURNALS, [])
     written = [f"{entry.code} = {entry.new}" for journal in journals for entry in journal.sent]
     names = list(dict.fromkeys(written))
-    more = f" and {len(names) - WRITES_NAMED} more" if len(names) > WRITES_NAMED else ""
-    return f"Sent by this command: {', '.join(names[:WRITES_NAMED])}{more}." if names else ""
+    return f"Sent by this command: {first_of(names, WRITES_NAMED)}." if names else ""
 
 
 def _with_writes(error: ClickError) -> ClickError:

@@ -190,7 +190,6 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
         rows.append(("  probably", found.profile.guide.trouble))
     if not found.alarm:
         reset = found.reset()
-        message = "" if reset.by_drive else f" ({TRUST['practice']})"
-        wait = f"; {reset.wait}" if reset.wait else ""
-        rows.append(("  reset", f"{reset.text}{wait}{message}"))
+        text = f"{reset.text}; {reset.wait}" if reset.wait else reset.text
+        rows.append(("  reset", text if reset.by_drive else f"{text} ({TRUST['practice']})"))
     return rows

@@ -30,6 +30,8 @@ Tell = Callable[["HoldEvent", int, str], None]
 """Is given an event, a device and a sentence."""
 
 HOLD_POLL_INTERVAL = 0.2
+_IN_FAULT = "Device {device} is in fault: {fault}."
+_NO_FAULT = "Device {device} is in fault no more."
 
 
 @dataclass(slots=True)
@@ -76,8 +78,8 @@ class Holding:
         before = self.faults.get(device)
         self.faults[device] = text
         if text != (before or "") and (text or before):
-            now = f"is in fault: {text}" if text else "is in fault no more"
-            self.tell("fault", device, f"Device {device} {now}.")
+            now = _IN_FAULT if text else _NO_FAULT
+            self.tell("fault", device, now.format(device=device, fault=text))
 
 
 async def hold_on(

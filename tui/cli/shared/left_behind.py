@@ -29,7 +29,7 @@ class LeftBehind(NamedTuple):
     exited: bool
     """False if its program is frozen, or has left the line."""
     text: str
-    """A clause without its full stop."""
+    """Sentences about the motor and its program."""
 
     def advice(self, line_text: str) -> str:
         """Both ways to deal with it, as commands for a line."""
@@ -41,7 +41,7 @@ class LeftBehind(NamedTuple):
 
     def sentence(self, line_text: str) -> str:
         """Return the program that started it, and the advice."""
-        return f"{self.text[0].upper()}{self.text[1:]}. {self.advice(line_text)}"
+        return f"{self.text} {self.advice(line_text)}"
 
     def fields(self) -> LeftBehindFields:
         """The fields of a document."""

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tui.drive.sentences import counted
+
 from .errors import USAGE, Failure
 
 if TYPE_CHECKING:
@@ -38,6 +40,14 @@ def seconds(shortest: float = 0.0, *, above: bool = False) -> FiniteRange:
     return FiniteRange(shortest, LONGEST_TIME, min_open=above)
 
 
+_TOO_SHORT = (
+    "--every {every:g} is too short: at {baud} baud, reading one word from one drive takes"
+    " {needed:.2g} s. Use a longer cycle.",
+    "--every {every:g} is too short: at {baud} baud, reading one word from {count} drives take"
+    " {needed:.2g} s. Use a longer cycle.",
+)
+
+
 def check_rate(link: Link, every: float, drives: int) -> None:
     """Raise Failure if a serial line cannot read each drive once in `every` seconds."""
     from tui.bus.link import SerialLink
@@ -49,9 +59,5 @@ def check_rate(link: Link, every: float, drives: int) -> None:
     exchange += 2 * silent_seconds(link.baud, link.format)
     needed = drives * exchange
     if every < needed:
-        each = "one drive takes" if drives == 1 else f"{drives} drives take"
-        raise Failure(
-            f"--every {every:g} is too short: at {link.baud} baud, reading one word from {each}"
-            f" {needed:.2g} s. Use a longer cycle.",
-            USAGE,
-        )
+        text = counted(drives, *_TOO_SHORT, every=every, baud=link.baud, needed=needed)
+        raise Failure(text, USAGE)

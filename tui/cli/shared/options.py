@@ -342,12 +342,18 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
     session.ratings[current.code] = Rating(Decimal(str(rated_current)), "A")
 
 
+_FITS_NONE = "Device {device} answers as {reference!r}; name its profile with -p: {profiles}."
+_NOT_IDENTIFIED = (
+    "Device {device} answers but does not identify itself; name its profile with -p: {profiles}."
+)
+
+
 def unidentified(identity: DriveIdentity) -> click.UsageError:
     """The error for a drive that no profile was named for and none fits."""
     from tui.drive.profile import library
 
-    who = f"as {identity.reference!r}" if identity.reference else "but does not identify itself"
+    text = _FITS_NONE if identity.reference else _NOT_IDENTIFIED
     fits = identity.candidates or tuple(listing.id for listing in library.listings())
     return click.UsageError(
-        f"Device {identity.device} answers {who}; name its profile with -p: {', '.join(fits)}."
+        text.format(device=identity.device, reference=identity.reference, profiles=", ".join(fits))
     )

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tui.drive.sentences import sentence
 from tui.session.patience import patience
 
 from .say import say
@@ -73,6 +74,16 @@ class PolledDrive:
                 say(f"drivepanel: {text}", err=True)
 
 
+_RUNS = (
+    "{drive}: its communication timeout {code} runs. After {timeout:g} s without a request:"
+    " {reaction}"
+)
+_RUNS_UNSURE = (
+    "{drive}: its communication timeout {code} runs (when it begins is in no document). After"
+    " {timeout:g} s without a request: {reaction}"
+)
+
+
 def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
     """Return a drive's reaction when polling stops, and the advice; empty if none."""
     who = f"Device {session.device}, {session.profile.name}"
@@ -84,13 +95,12 @@ def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
     watch = found.watch
     if watch is None or not watch.active:
         return ""
-    does = watch.reaction.does.rstrip(".") if watch.reaction else "its own reaction follows"
-    runs = "" if watch.sure else " (when it begins is in no document)"
-    after = " After a trip: drivepanel reset." if watch.trips else ""
-    return (
-        f"{who}: its communication timeout {watch.code} runs{runs}. After {watch.timeout:g} s"
-        f" without a request: {does}.\nTo keep polling it: {hold_text(session, line_text)}.{after}"
+    does = sentence(watch.reaction.does) if watch.reaction else "Its own reaction follows."
+    text = (_RUNS if watch.sure else _RUNS_UNSURE).format(
+        drive=who, code=watch.code, timeout=watch.timeout, reaction=does
     )
+    text = f"{text}\nTo keep polling it: {hold_text(session, line_text)}."
+    return f"{text} After a trip: drivepanel reset." if watch.trips else text
 
 
 def hold_text(session: DriveSession, line_text: str) -> str:

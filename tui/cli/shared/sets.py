@@ -214,9 +214,9 @@ class ResultTelling:
             text = "Ended by Ctrl-C. The first setting may have been written: read it."
             return Failure(text, INTERRUPTED)
         count, names = len(written), ", ".join(written) or "none"
-        more = len(self.results) < self._of
-        rest = " The next one may have been written too: read it." if more else ""
-        text = f"Ended by Ctrl-C: {count} of {self._of} written: {names}.{rest}"
+        text = f"Ended by Ctrl-C: {count} of {self._of} written: {names}."
+        if len(self.results) < self._of:
+            text = f"{text} The next one may have been written too: read it."
         return Failure(text, INTERRUPTED)
 
 

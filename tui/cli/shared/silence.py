@@ -33,6 +33,20 @@ def is_slow(line: ModbusLine, device: int) -> bool:
     return late or line.device_state(device).lateness > 0
 
 
+_AS_TYPED = (
+    "Are address, wiring, {link.baud} baud and {link.format} (as typed) those of the drive?"
+    " Others: serial:{link.path},BAUD,FORMAT."
+)
+_OF_PROFILE = (
+    "Are address, wiring, {link.baud} baud and {link.format} (the profile's own) those of the"
+    " drive? Others: serial:{link.path},BAUD,FORMAT."
+)
+_DEFAULTS = (
+    "Are address, wiring, {link.baud} baud and {link.format} (as no others are named) those of the"
+    " drive? Others: serial:{link.path},BAUD,FORMAT."
+)
+
+
 def about_silence(opened: OpenLine, text: str, device: int, *, by_profile: bool) -> str:
     """Return what to check if no drive answers; empty for a line without settings of its own."""
     from tui.bus.link import SerialLink, UsualSettings, parse_link
@@ -45,11 +59,8 @@ def about_silence(opened: OpenLine, text: str, device: int, *, by_profile: bool)
     other = UsualSettings(link.baud + 1, "8N1" if link.format != "8N1" else "8E1")
     plain = parse_link(text, other)
     named = isinstance(plain, SerialLink) and (plain.baud, plain.format) == (link.baud, link.format)
-    whose = "as typed" if named else "the profile's own" if by_profile else "as no others are named"
-    return (
-        f"Are address, wiring, {link.baud} baud and {link.format} ({whose}) those of the drive?"
-        f" Others: serial:{link.path},BAUD,FORMAT."
-    )
+    text = _AS_TYPED if named else _OF_PROFILE if by_profile else _DEFAULTS
+    return text.format(link=link)
 
 
 def silence_hint(error: Exception, opened: OpenLine, text: str, *, by_profile: bool) -> str:

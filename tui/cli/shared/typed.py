@@ -48,6 +48,10 @@ def process_began() -> float:
     return now - max(0.0, age)
 
 
+_STOPPED = "Device {device}: it was stopped after this command was typed."
+_STOPPED_BY = "Device {device}: it was stopped after this command was typed ({by})."
+
+
 def refuse_if_stopped(session: DriveSession) -> None:
     """Raise Failure if the drive was stopped after this command was typed.
 
@@ -60,9 +64,6 @@ def refuse_if_stopped(session: DriveSession) -> None:
     if (typed := typed_at(context)) is None or stopped <= typed:
         return
     session.arming.disarm()
-    by = f" ({by})" if (by := stops.by.get(device, "")) else ""
-    raise Failure(
-        f"Device {device}: it was stopped after this command was typed{by}. Nothing was sent."
-        " Type it again if it is meant.",
-        REFUSED_HERE,
-    )
+    by = stops.by.get(device, "")
+    text = (_STOPPED_BY if by else _STOPPED).format(device=device, by=by)
+    raise Failure(f"{text} Nothing was sent. Type it again if it is meant.", REFUSED_HERE)

@@ -254,5 +254,5 @@ def _clock(snapshot: Snapshot) -> str:
 def _shown(code: str, reading: Reading) -> str:
     text = f"{reading.text} {reading.unit}".rstrip() if reading.value else reading.text
     if reading.value is not None and reading.value.taught:
-        text += " taught"
+        text = f"{text} taught"
     return f"{code} {text}" if reading.quality == "good" else f"{code} ({text}, {reading.quality})"

@@ -102,20 +102,18 @@ def place_of(profile: Profile, slot: str) -> tuple[Block, int]:
             if code.casefold() == slot.strip().casefold():
                 return block, place
     known = [f"{b.slots[0]} to {b.slots[-1]}" for b in profile.data.blocks]
-    hint = f" It has {', '.join(known)}." if known else f" {no_blocks(profile)}"
-    raise MappingError(f"{profile.name} has no slot {slot!r}.{hint}")
+    hint = f"It has {', '.join(known)}." if known else no_blocks(profile)
+    raise MappingError(f"{profile.name} has no slot {slot!r}. {hint}")
 
 
 def no_blocks(profile: Profile) -> str:
     """Return a text for a family without blocks: why, and what to use instead."""
     function = profile.function(3)
     longest = function.max_read if function else None
-    instead = (
-        f" One read returns up to {longest} adjacent words instead."
-        if longest and longest > 1
-        else ""
-    )
-    return f"{profile.name} has neither an indirect block nor a communication scanner.{instead}"
+    text = f"{profile.name} has neither an indirect block nor a communication scanner."
+    if not longest or longest <= 1:
+        return text
+    return f"{text} One read returns up to {longest} adjacent words instead."
 
 
 def slot_changes(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:

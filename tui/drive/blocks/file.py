@@ -82,8 +82,8 @@ def _assignment(
 ) -> Assignment:
     for slot in table:
         if slot not in block.slots:
-            text = f"{slot!r} is not a slot of the {block.name.lower()}. Use"
-            text += f" {', '.join(block.slots)}."
+            slots = ", ".join(block.slots)
+            text = f"{slot!r} is not a slot of {block.name}. Use {slots}."
             raise _fault(file, lines, block.id, slot, text)
     missing = [slot for slot in block.slots if slot not in table]
     if missing:
@@ -127,8 +127,10 @@ def _check_head(
     if not isinstance(head, dict) or "format" not in head:
         raise MappingError(f"{file}:1: not an assignment: [{HEAD}] with format is missing.")
     if head["format"] != BLOCK_FILE_FORMAT:
-        text = f"this assignment has format {head['format']};"
-        text += f" this panel reads format {BLOCK_FILE_FORMAT}."
+        text = (
+            f"this assignment has format {head['format']}; this panel reads format"
+            f" {BLOCK_FILE_FORMAT}."
+        )
         raise _fault(file, lines, HEAD, "format", text)
     if head.get("profile") != profile.id:
         text = f"this assignment is for {head.get('profile')!r}, the drive is {profile.id!r}."

@@ -89,10 +89,14 @@ def _shape_problems(plan: Assignment) -> list[Problem]:
         text = f"{holes[0]} is unused, so the slots after it are not read through the block."
         found.append(Problem(holes[0], text, refuses=False))
     if length < block.min_words:
-        done = "written" if _writes_block(block) else "read"
-        text = f"Map more slots: at least {block.min_words} words are {done} at once."
+        text = _FEW_WRITTEN if _writes_block(block) else _FEW_READ
+        text = text.format(words=block.min_words)
         found.append(Problem(block.slots[length], text, refuses=False))
     return found
+
+
+_FEW_WRITTEN = "Map more slots: at least {words} words are written at once."
+_FEW_READ = "Map more slots: at least {words} words are read at once."
 
 
 def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
@@ -100,15 +104,15 @@ def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
     code = parameter.code
     if block.selects_by == "choice" and code not in {c.parameter for c in block.choices}:
         codes = ", ".join(choice.parameter for choice in block.choices)
-        return f"The {block.name.lower()} cannot hold {code}. It can hold {codes}."
+        return f"{block.name} cannot hold {code}. It can hold {codes}."
     if word_count(parameter) != 1:
         return f"{code} has two words; a slot holds one."
     if parameter.address == UNUSED:
         return f"{code} has the address 0, which marks an unused slot."
     if block.direction == "read" and parameter.access == "w":
-        return f"{code} can only be written. The {block.name.lower()} cannot hold it."
+        return f"{code} can only be written. {block.name} cannot hold it."
     if block.direction == "write" and parameter.access == "r":
-        return f"{code} can only be read. The {block.name.lower()} cannot hold it."
+        return f"{code} can only be read. {block.name} cannot hold it."
     if block.direction == "write" and parameter.forbidden:
         return f"{code} is never written by Drive Panel: {parameter.forbidden}"
     own = {c for b in profile.data.blocks for c in (*b.slots, *b.values)}

@@ -8,6 +8,8 @@ from pathlib import Path
 
 import msgspec
 
+from tui.drive.sentences import sentence
+
 from ..errors import ProfileError
 from .converting import converted
 from .form import form_faults, place_label
@@ -63,7 +65,7 @@ def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
     """Return the faults of form, and the other faults that can still be found."""
     form, mended = form_faults(sources.tables)
     reported = [
-        (path, f"{place_label(sources.tables, path)}: {text.rstrip('.')}.")
+        (path, f"{place_label(sources.tables, path)}: {sentence(text)}")
         for path, text in form.found
     ]
     try:

@@ -10,6 +10,8 @@ from typing import Any
 
 import msgspec.inspect as shapes
 
+from tui.drive.sentences import any_of
+
 from .schema import ProfileData
 from .toml_lines import TomlPath
 
@@ -73,7 +75,7 @@ def _struct(
     for key, inner in value.items():
         if key not in fields:
             faults.found.append(
-                ((*path, key), f"`{key}` is not a field of this table{_instead(key, list(fields))}")
+                ((*path, key), _instead(f"`{key}` is not a field of this table", key, list(fields)))
             )
             continue
         item = _mended(fields[key].type, inner, (*path, key), faults)
@@ -113,11 +115,11 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
             return "" if isinstance(value, bool) else f"must be true or false, not {reported}"
         case shapes.IntType(ge=low, le=high):
             if isinstance(value, bool) or not isinstance(value, int):
-                return f"must be of type int, not {reported}{_between(low, high)}"
+                return _within(f"must be of type int, not {reported}", low, high)
             if low is not None and value < low:
-                return f"must be >= {low}, not {value}{_between(low, high)}"
+                return _within(f"must be >= {low}, not {value}", low, high)
             if high is not None and value > high:
-                return f"must be <= {high}, not {value}{_between(low, high)}"
+                return _within(f"must be <= {high}, not {value}", low, high)
         case shapes.StrType(pattern=pattern):
             if not isinstance(value, str):
                 return f"must be of type str (a text in quotes), not {reported}"
@@ -126,24 +128,25 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
                 return f"{value!r} has the wrong form; use {form}"
         case shapes.LiteralType(values=values):
             if value not in values or isinstance(value, bool):
-                return f"{value!r} is not an allowed value{_instead(value, values)}"
+                return _instead(f"{value!r} is not an allowed value", value, values)
         case _:
             return f"must be {_kind(shape)}, not {reported}"
     return ""
 
 
-def _between(low: object, high: object) -> str:
-    return "" if low is None and high is None else f"; allowed is {low} to {high}"
+def _within(fault: str, low: object, high: object) -> str:
+    """Return a fault of a number with the range, if it has one."""
+    return fault if low is None and high is None else f"{fault}; allowed is {low} to {high}"
 
 
-def _instead(wrong: object, choice: Any) -> str:
-    """Return the allowed values: all of them, or the nearest of very many."""
+def _instead(fault: str, wrong: object, choice: Any) -> str:
+    """Return a fault with the allowed values: all of them, or the nearest of very many."""
     texts = [str(item) for item in choice]
     near = difflib.get_close_matches(str(wrong), texts, n=3, cutoff=0.5)
-    hint = f"; did you mean {' or '.join(near)}?" if near else "."
+    text = f"{fault}; did you mean {any_of(near)}?" if near else f"{fault}."
     if len(texts) <= LISTED_SINGLY:
-        return f"{hint} Allowed: {', '.join(texts)}"
-    return f"{hint} `drivepanel profiles --schema` lists all {len(texts)} allowed values"
+        return f"{text} Allowed: {', '.join(texts)}"
+    return f"{text} `drivepanel profiles --schema` lists all {len(texts)} allowed values"
 
 
 def _kind(shape: shapes.Type) -> str:
@@ -157,7 +160,8 @@ def _kind(shape: shapes.Type) -> str:
         case shapes.LiteralType(values=values):
             return f"one of {', '.join(map(str, values[:LISTED_SINGLY]))}"
         case shapes.IntType(ge=low, le=high):
-            return f"a number{_between(low, high).replace('; allowed is', ' from')}"
+            no_limit = low is None and high is None
+            return "a number" if no_limit else f"a number from {low} to {high}"
         case shapes.BoolType():
             return "true or false"
         case shapes.UnionType(types=types):
@@ -203,4 +207,5 @@ def place_label(tables: dict[str, Any], path: TomlPath) -> str:
             break
         if isinstance(node, dict):
             owner = str(node.get("code") or node.get("id") or owner)
-    return f"{steps or 'the file'}{f' ({owner})' if owner else ''}"
+    place = steps or "the file"
+    return f"{place} ({owner})" if owner else place

@@ -11,6 +11,8 @@ from typing import TypeVar
 
 import msgspec
 
+from tui.drive.sentences import sentence
+
 from ..errors import ProfileError
 from .converting import converted
 from .form import form_faults, place_label
@@ -127,8 +129,7 @@ def decode_tables(source: SourceText, form: type[T]) -> T:
     except msgspec.ValidationError as error:
         found = form_faults(tables, form)[0].found or [((), str(error))]
         lines = [
-            f"{source.file}:{line_of(source, path)}: {place_label(tables, path)}:"
-            f" {fault.rstrip('.')}."
+            f"{source.file}:{line_of(source, path)}: {place_label(tables, path)}: {sentence(fault)}"
             for path, fault in found
         ]
         raise ProfileError("\n".join(lines)) from error

@@ -197,10 +197,8 @@ class Profile:
             return found
         near = difflib.get_close_matches(wanted.casefold(), self._by_folded, n=3, cutoff=0.5)
         hint = ", ".join(dict.fromkeys(self._by_folded[n].code for n in near))
-        raise UnknownParameter(
-            f"{self.name} has no parameter {text!r}."
-            + (f" Did you mean {hint}?" if hint else " Type a code, W9001, 16#2329 or 9001.")
-        )
+        way = f"Did you mean {hint}?" if hint else "Type a code, W9001, 16#2329 or 9001."
+        raise UnknownParameter(f"{self.name} has no parameter {text!r}. {way}")
 
     def chart(self, raws: Mapping[str, int]) -> Chart | None:
         """Return the active state chart, from raw values by code: the first whose condition

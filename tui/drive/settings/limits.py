@@ -100,9 +100,13 @@ def _past_multiples(
             continue
         held = shown(profile, parameter, after[code], after).display
         reported = f"{code} = {held} would be {side} {limit:f} {parameter.unit}".rstrip()
-        sure = limits_are_sure(parameter)
-        doubt = "" if sure else "; no document of this family states this limit"
-        yield code if code in edits else of.parameter, f"{reported} ({formula_of(of)}{doubt})."
+        text = _BEYOND if limits_are_sure(parameter) else _BEYOND_DOUBTED
+        text = text.format(change=reported, formula=formula_of(of))
+        yield code if code in edits else of.parameter, text
+
+
+_BEYOND = "{change} ({formula})."
+_BEYOND_DOUBTED = "{change} ({formula}; no document of this family states this limit)."
 
 
 def passed_side(parameter: Parameter, of: Multiple, number: Decimal, limit: Decimal) -> str:

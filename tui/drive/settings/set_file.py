@@ -93,8 +93,10 @@ def _tables(text: str, fault: _Fault) -> dict[str, Any]:
         at_end = match is not None and match[1] is None
         line = int(match[1]) if match and match[1] else text.count("\n") + 1
         what = _AT.sub("", str(error)).strip()
-        cut = " The file seems to be cut short here." if at_end else ""
-        raise fault(line, f"not a parameter set: {what}.{cut}") from error
+        reported = f"not a parameter set: {what}."
+        if at_end:
+            reported = f"{reported} The file seems to be cut short here."
+        raise fault(line, reported) from error
 
 
 def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:

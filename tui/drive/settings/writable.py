@@ -110,12 +110,17 @@ def write_refusal(
             f" {parameter.number}. Compare it with the keypad, then confirm it once.",
         )
     if needs_standstill(profile, parameter) and state not in AT_REST:
-        now = f"the drive is now {state}" if state else "its state is unknown"
-        return Refusal(
-            "running", f"{code} can be written only with the motor stopped; {now}. Stop it first."
-        )
+        text = _NOT_AT_REST if state else _STATE_NOT_KNOWN
+        return Refusal("running", text.format(code=code, state=state))
     return None
 
+
+_NOT_AT_REST = (
+    "{code} can be written only with the motor stopped; the drive is now {state}. Stop it first."
+)
+_STATE_NOT_KNOWN = (
+    "{code} can be written only with the motor stopped; its state is unknown. Stop it first."
+)
 
 _STORAGE = {
     "ram": "lost at power-off",
@@ -181,13 +186,15 @@ def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
     watch = profile.data.communication_fault
     if watch is None:
         return ""
-    lost = "a motor then runs on after a communication loss"
     if parameter.code == watch.timeout and raw == watch.off:
-        return f"This switches the communication timeout of the drive off: {lost}."
+        return (
+            "This switches the communication timeout of the drive off: a motor then runs on after a"
+            " communication loss."
+        )
     if parameter.code == watch.reaction:
         reaction = next((r for r in watch.reactions if r.raw == raw), None)
         if reaction is not None and reaction.motor_keeps_running:
-            return f"{reaction.name}: {lost}."
+            return f"{reaction.name}: a motor then runs on after a communication loss."
     return ""
 
 

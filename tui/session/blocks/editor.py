@@ -20,6 +20,7 @@ from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import Block
+from tui.drive.sentences import sentence
 from tui.drive.settings.writable import AT_REST
 
 from ..drive import DriveSession
@@ -268,7 +269,7 @@ class BlockEditor:
             raws = session.image.raws
             sent = values_text(session.profile, agreed.wanted, raws)
             back = values_text(session.profile, done.inputs, raws)
-            return f"Wrote {sent}." + (f" The reply has {back}." if back else "")
+            return f"Wrote {sent}. The reply has {back}." if back else f"Wrote {sent}."
 
         self._run(work, "Writing through the outputs", stamp)
 
@@ -327,6 +328,15 @@ class BlockEditor:
         self.session.work.tell(kind, text)
 
 
+_WRONG = {
+    (False, False): "{slot.code} {slot.verdict}",
+    (False, True): "{slot.code} {slot.verdict} until the next reset",
+    (True, False): "{slot.code} {slot.verdict}, returns {slot.brings}",
+    (True, True): "{slot.code} {slot.verdict}, returns {slot.brings} until the next reset",
+}
+"""By whether the slot brings something, and whether it waits for a reset."""
+
+
 def _verdict(views: list[BlockView]) -> tuple[str, bool]:
     """Return the result of comparing all blocks, and whether all is well."""
     wrong: list[str] = []
@@ -339,10 +349,9 @@ def _verdict(views: list[BlockView]) -> tuple[str, bool]:
         for slot in view.slots:
             counted += slot.verdict in (SlotMatch.SAME, SlotMatch.MOVING)
             if slot.verdict in (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE):
-                brings = f", returns {slot.brings}" if slot.brings else ""
-                waits = " until the next reset" if slot.force is Force.PENDING else ""
-                wrong.append(f"{slot.code} {slot.verdict}{brings}{waits}")
+                text = _WRONG[bool(slot.brings), slot.force is Force.PENDING]
+                wrong.append(text.format(slot=slot))
     text = f"{counted} slots match direct reads."
     if wrong:
-        return f"{'; '.join(wrong)}. {text}", False
+        return " ".join([*map(sentence, wrong), text]), False
     return text, True

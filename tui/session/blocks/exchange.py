@@ -65,7 +65,7 @@ async def exchange(
         raise AssignmentRefused(f"{why} Nothing was written.")
     if outputs.block.effective == "after-reset" and not in_force:
         raise AssignmentRefused(
-            f"Nothing was written: the mapping that the {outputs.block.name.lower()} has had since"
+            f"Nothing was written: the mapping that {outputs.block.name} has had since"
             " the last reset cannot be read, and was not confirmed."
         )
     retrying = RetryingReader(session)
@@ -206,10 +206,10 @@ class _Exchange:
         if wrong := self._not_held(raws, back):
             texts = [
                 f"{c} was written as {self._text(profile[c], raws[c])}, but the drive holds"
-                f" {self._text(profile[c], back[c])}"
+                f" {self._text(profile[c], back[c])}."
                 for c in wrong
             ]
-            raise NotTaken(f"{'; '.join(texts)}.")
+            raise NotTaken(" ".join(texts))
 
     def _not_held(self, raws: Mapping[str, int], back: Mapping[str, int]) -> list[str]:
         """Return named codes whose value differs; not commands, because the state shows their
@@ -337,7 +337,7 @@ class ExchangeChecks:
             changed = [slot for slot, raw in plan.slots.items() if held.get(slot) != raw]
             if not changed:
                 continue
-            text = f"another program changed {', '.join(changed)} of the {block.name.lower()}."
+            text = f"another program changed {', '.join(changed)} of {block.name}."
             if when == "before":
                 raise AssignmentRefused(f"Nothing was written: {text} Check the slots first.")
             if plan is self.inputs:

@@ -218,7 +218,7 @@ class Mapper:
                 self.session.device, *stretch, priority=self.priority
             )
         except DeviceException as refusal:
-            return (), f"The drive refuses reads of the {block.name.lower()}: {refusal}"
+            return (), f"The drive refuses reads of {block.name}: {refusal}"
         return reply.words, ""
 
     def _slot(

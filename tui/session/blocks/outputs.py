@@ -10,6 +10,7 @@ from tui.drive.blocks.wire_cost import block_request, reach, together
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
+from tui.drive.sentences import all_of
 from tui.drive.shown import raw_of_text, shown_text, typed_text
 from tui.drive.values import to_words
 from tui.wire.frames import hex_text
@@ -127,8 +128,8 @@ def _lines(
         lines.append(f"Also written, with its present value: {', '.join(beside)}.")
     if block.effective == "after-reset":
         lines.append(
-            f"The mapping that the {block.name.lower()} has had since the last reset cannot be"
-            f" read. Continue only if {' and '.join(block.slots)} were set before the drive was"
+            f"The mapping that {block.name} has had since the last reset cannot be"
+            f" read. Continue only if {all_of(block.slots)} were set before the drive was"
             " last reset or switched on."
         )
     if any(_moves(profile, describe(profile, block, outputs.raws[place])) for place in places):

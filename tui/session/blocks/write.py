@@ -22,6 +22,9 @@ from ..read.retrying_reader import RetryingReader
 from ..settings.write import NotTaken, Writer, device_refusal
 from ..work import Permit
 
+_NOTHING_WRITTEN = "Nothing was written."
+_NOTHING_BEFORE = "Nothing was written before it."
+
 
 class AssignmentRefused(MappingError):
     """An assignment or an exchange was not written, or only a part; the text says which.
@@ -52,9 +55,9 @@ class Written:
         codes = ", ".join(dict.fromkeys(change.slot for change in self.changes))
         text = f"Wrote {codes}, all verified."
         if self.after_reset:
-            text += " Takes effect after the drive's next reset."
+            text = f"{text} Takes effect after the drive's next reset."
         if self.unsaved:
-            text += " Lost at power-off until saved."
+            text = f"{text} Lost at power-off until saved."
         return text
 
 
@@ -176,6 +179,6 @@ class _Writing:
         if sent:
             text = f"{sent} was sent, and may have been written: {text}"
         if not self.done:
-            return f"{text} Nothing was written{' before it' if sent else ''}."
+            return f"{text} {_NOTHING_BEFORE if sent else _NOTHING_WRITTEN}"
         codes = ", ".join(dict.fromkeys(change.slot for change in self.done))
         return f"{text} Already written: {codes}."

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from datetime import datetime
 
 import tui
+from tui.drive.sentences import counted
 
 from .parts import Content, PartResult
 from .redaction import OMITTED_KINDS, Redaction
@@ -133,7 +134,7 @@ def _omitted_lines(omitted: dict[str, int]) -> Iterator[str]:
     yield "-------"
     for kind in OMITTED_KINDS.values():
         count = omitted.get(kind, 0)
-        yield f"{kind}: {count} {'place' if count == 1 else 'places'}"
+        yield counted(count, "{kind}: 1 place", "{kind}: {count} places", kind=kind)
     by = ", ".join(f"{sign} for {kind}" for sign, kind in OMITTED_KINDS.items())
     yield ""
     yield from textwrap.wrap(f"In their places: {by}.", README_WIDTH)

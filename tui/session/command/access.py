@@ -29,6 +29,9 @@ from ..work import Permit
 from .reference import Reference
 from .unblock_hint import block_reason_text
 
+NO_CHART = (
+    "Drive Panel does not command this drive: the words that select its commands were not read."
+)
 STATE_POLL_INTERVAL = 0.05
 
 
@@ -68,8 +71,9 @@ class CommandAccess(Writer):
         await self.read([code for code in dict.fromkeys(codes) if code])
         found = chart_in_force(session.profile, self.raws)
         if found is None or not found.orders:
-            why = found.name if found else "the words that select its commands were not read"
-            raise OrderRefused(f"Drive Panel does not command this drive: {why}.")
+            if found is None:
+                raise OrderRefused(NO_CHART)
+            raise OrderRefused(f"Drive Panel does not command this drive: {found.name}.")
         held = held_back(session.profile, found, wanted, self.raws) if wanted is not None else None
         if held is not None:
             raise OrderRefused(block_reason_text(held))

@@ -39,7 +39,7 @@ from ..settings.write import Writer
 from ..starts.keeper import NothingToTakeOver
 from ..work import Outcome, OutcomeKind, Permit, Task
 from .access import CommandAccess, CommandHistory
-from .motor_start import MotorStart, check_scale, without_effect, write_reference
+from .motor_start import MotorStart, check_scale, with_effect, write_reference
 from .reference import (
     Reference,
     parse_reference,
@@ -202,6 +202,8 @@ class Commander:
         self._take_steps()
 
 
+ORDER_GIVEN = "{order}: {state}"
+REFERENCE_LEFT = "{order}: {state}; the reference is {reference} now"
 STILL_IN_FAULT = "sent, but the drive is still in fault: its cause is still present"
 
 
@@ -220,11 +222,13 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
     name = now.name
     if id == "reset" and now.kind == "fault":
         name = not_in_command(access.session.profile, access.raws) or STILL_IN_FAULT
-    return f"{order.name}: {name}{await _cleared(access, order)}"
+    reference = await _reference_left(access, order)
+    text = REFERENCE_LEFT if reference else ORDER_GIVEN
+    return text.format(order=order.name, state=name, reference=reference)
 
 
-async def _cleared(access: CommandAccess, order: Order) -> str:
-    """Describe the current reference if a command resets words; empty for other commands."""
+async def _reference_left(access: CommandAccess, order: Order) -> str:
+    """Return the current reference if a command resets words; empty for other commands."""
     if not order.clears:
         return ""
     access.session.image.forget(order.clears)
@@ -237,7 +241,7 @@ async def _cleared(access: CommandAccess, order: Order) -> str:
     reading = readings.get(parameter.code) if parameter is not None else None
     if reading is None or reading.value is None:
         return ""
-    return f"; the reference is {reading.value.display} now"
+    return reading.value.display
 
 
 async def check_run(access: CommandAccess, id: OrderId, reference: str | None) -> str:
@@ -267,7 +271,7 @@ async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | 
     chart = await access.chart(id)
     wanted = None if reference is None else await _typed_reference(access, reference)
     done = await MotorStart(access).carry_out(chart, id, wanted)
-    return done if reference is None else f"{done}{without_effect(access)}"
+    return done if reference is None else with_effect(access, done)
 
 
 async def give_reference(access: CommandAccess, text: str) -> str:
@@ -342,8 +346,9 @@ async def configure(session: DriveSession, writer: Writer, source: ControlSource
     if left:
         codes = ", ".join(change.parameter.code for change in left)
         raise OrderRefused(f"{source.name}: the drive has changed {codes} again.")
-    done = f"wrote {', '.join(written)}" if written else "no change was necessary"
-    return f"Control source {source.name}: {done}"
+    if not written:
+        return f"Control source {source.name}: no change was necessary"
+    return f"Control source {source.name}: wrote {', '.join(written)}"
 
 
 async def _raws(session: DriveSession) -> dict[str, int]:

@@ -18,6 +18,7 @@ from tui.drive.orders import stop_alike
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 from tui.drive.profile.stop_profile import StopProfile, stop_profile_of
+from tui.drive.sentences import any_of
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
@@ -27,6 +28,10 @@ ONE_WORD = Limits(
 )
 """Requests allowed to an unidentified drive."""
 FIRST_WHY = "stopped before it was identified"
+
+
+_SENT = "16#{word:04X} to {code}, the stop of {families}"
+_SENT_IN_VAIN = "16#{word:04X} to {code}, the stop of {families} ({answer})"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +51,11 @@ class SentFirst:
     def text(self) -> str:
         """The word, its register, the families that it stops, and its result, for a person."""
         names = [family.name for family in self.what.families]
-        target = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
-        message = "" if self.taken else f" ({self.answer})"
-        return f"16#{self.what.word:04X} to {self.what.code}, the stop of {target}{message}"
+        text = _SENT if self.taken else _SENT_IN_VAIN
+        what = self.what
+        return text.format(
+            word=what.word, code=what.code, families=any_of(names), answer=self.answer
+        )
 
 
 @dataclass(frozen=True, slots=True)

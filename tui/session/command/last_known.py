@@ -11,6 +11,14 @@ from ..drive import DriveSession
 
 ENABLED = frozenset({"running", "stopping"})
 
+COMMANDED_BY = "its command source is {source}, not Modbus. Stop it there or at the machine."
+COMMANDED_BY_WORD = (
+    "its command source is {source} ({code}), not Modbus. Stop it there or at the machine."
+)
+COMMANDED_LOCALLY = (
+    "run by its terminals or keypad, not by Modbus. Stop it there or at the machine."
+)
+
 
 def last_known_stop(session: DriveSession, order: OrderId) -> tuple[Chart, Order]:
     """Return the words that stop a drive by its last known state. Raises OrderRefused.
@@ -51,15 +59,7 @@ def run_by_others(session: DriveSession) -> str:
         return ""
     found = command_channel(session.profile, session.image.trusted)
     if found is not None and found.by_line is False and found.text:
-        code = f" ({found.parameter.code})" if found.parameter is not None else ""
-        who = f"{_small(found.text)}{code}"
-    elif state.local:
-        who = "its terminals or keypad"
-    else:
-        return ""
-    return f"run by {who}, not by Modbus. Stop it there or at the machine."
-
-
-def _small(name: str) -> str:
-    """Return a name for use within a sentence; acronyms keep their capitals."""
-    return f"its {name[0].lower()}{name[1:]}" if name[1:2].islower() else name
+        if found.parameter is None:
+            return COMMANDED_BY.format(source=found.text)
+        return COMMANDED_BY_WORD.format(source=found.text, code=found.parameter.code)
+    return COMMANDED_LOCALLY if state.local else ""

@@ -14,6 +14,7 @@ from tui.bus.errors import LineError, LineFailed, LineLost
 from tui.bus.link import label
 from tui.bus.requests import WriteOne
 from tui.drive.errors import DriveError
+from tui.drive.sentences import sentence
 
 from ..carry_on import carried_on
 from ..drive import DriveSession
@@ -82,7 +83,7 @@ class LastStop:
     def _ended(self, session: DriveSession, ordered: float, lost: str, why: str) -> None:
         """Report that the frames were sent, or `why` not; `lost` is the error of a lost line."""
         if why:
-            text = not_stopped(lost) if lost else f"{NOT_SENT}{why.rstrip('.')}. {AT_THE_MACHINE}"
+            text = not_stopped(lost) if lost else f"{NOT_SENT}{sentence(why)} {AT_THE_MACHINE}"
             self._say(session, Phase.FAILED, text, ordered)
             return
         text = SENT_THOUGH_LOST if lost else PREPARED_SENT

@@ -19,6 +19,16 @@ LOOKS = 10
 """Reads within which the motor must turn in the commanded direction."""
 
 
+NO_EFFECT = "{result}; no effect: the reference comes from {source}"
+REFERENCE_TEXTS = {
+    (False, False): "Reference {value} ({code})",
+    (True, False): "Reference {value} ({code}) for {requested}",
+    (False, True): "Reference {value} ({code}), rounded to what the drive can hold",
+    (True, True): "Reference {value} ({code}) for {requested}, rounded to what the drive can hold",
+}
+"""By whether it was converted to another unit, and whether it was rounded."""
+
+
 class WrongReference(OrderRefused):
     """The drive holds another reference than the requested one; the motor was not started."""
 
@@ -31,12 +41,16 @@ async def write_reference(
         reference.parameter, reference.raw, why="reference", replaceable=replaceable
     )
     access.session.note_command()
-    converted = f" for {reference.requested}" if reference.is_converted else ""
-    rounded = ", rounded to what the drive can hold" if reference.rounded else ""
-    text = f"Reference {reference.text} ({reference.parameter.code}){converted}{rounded}"
-    text += without_effect(access)
+    text = with_effect(access, reference_text(reference))
     access.given.note_reference(reference, text)
     return text
+
+
+def reference_text(reference: Reference) -> str:
+    """Return a written reference as a text, and how it differs from the requested one."""
+    text = REFERENCE_TEXTS[reference.is_converted, bool(reference.rounded)]
+    code, requested = reference.parameter.code, reference.requested
+    return text.format(value=reference.text, code=code, requested=requested)
 
 
 async def check_scale(access: CommandAccess) -> None:
@@ -50,12 +64,12 @@ async def check_scale(access: CommandAccess) -> None:
         raise OrderRefused(refusal)
 
 
-def without_effect(access: CommandAccess) -> str:
-    """Return a clause that a reference has no effect; empty unless another source gives it."""
+def with_effect(access: CommandAccess, result: str) -> str:
+    """Return the result of giving a reference; it adds if another source gives the reference."""
     found = reference_channel(access.session.profile, access.raws)
     if found is None or found.by_line is not False:
-        return ""
-    return f"; no effect: the reference comes from {found.text}"
+        return result
+    return NO_EFFECT.format(result=result, source=found.text)
 
 
 @dataclass(slots=True)

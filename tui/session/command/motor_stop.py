@@ -47,6 +47,25 @@ STANDSTILL_POLL_INTERVAL = 0.15
 SILENT_WAIT = 0.1
 """Seconds that a drive which was silent before has to answer the first of several stops."""
 
+OTHER_WAY = "{progress} (it has no {wanted}: {way})"
+STILL_ENABLED = {
+    "local": "it is at 0 Hz and still enabled from its terminals or keypad: a reference turns it at"
+    " once.",
+    "channel": "it is at 0 Hz and still enabled {channel}: a reference turns it at once.",
+    "unknown": "it is at 0 Hz and still enabled by another source: a reference turns it at once.",
+}
+RUNS_ON = {
+    "local": "it answers and runs on; it is commanded from its terminals or keypad.",
+    "channel": "it answers and runs on; it is commanded {channel}.",
+    "unknown": "it answers and runs on; it is commanded by another source.",
+}
+"""Why a motor does not stop, by the source of its commands."""
+
+
+def _way(order: OrderId) -> str:
+    return "ramp stop" if order == "stop" else order.replace("-", " ")
+
+
 TellStop = Callable[[DriveSession, Phase, str, float], None]
 
 
@@ -252,9 +271,8 @@ class MotorStop:
                 await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
                 continue
             self._unheeded = False
-            speed = f", {hertz:g} Hz" if hertz else ""
-            text = f"{order.name}{speed}{self._instead()}"
-            self.say(self.session, Phase.STOPPING, text, self.ordered)
+            what = f"{order.name}, {hertz:g} Hz" if hertz else order.name
+            self.say(self.session, Phase.STOPPING, self._with_way(what), self.ordered)
             await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
         return "it still turns after a minute."
 
@@ -264,25 +282,23 @@ class MotorStop:
         if session.guessed:
             self.say(session, Phase.FAILED, not_proved(session.profile.name), self.ordered)
         else:
-            self.say(session, Phase.STOPPED, f"stopped{self._instead()}", self.ordered)
+            self.say(session, Phase.STOPPED, self._with_way("stopped"), self.ordered)
 
-    def _instead(self) -> str:
-        """Return a clause about the way to stop that the drive lacks; empty if it has it."""
+    def _with_way(self, progress: str) -> str:
+        """Return a progress with the way to stop that the drive lacks, if it has another one."""
         if self.order == self.wanted:
-            return ""
-        wanted, way = self.wanted.replace("-", " "), self.order.replace("-", " ")
-        return f" (it has no {wanted}: {'ramp stop' if way == 'stop' else way})"
+            return progress
+        return OTHER_WAY.format(progress=progress, wanted=_way(self.wanted), way=_way(self.order))
 
     def _why_not(self, hertz: float | None) -> str:
         """Return why a drive that does not obey is still enabled."""
         state = self.session.state(STATE_FRESH)
-        who = "from its terminals or keypad" if state.local else state.channel
-        if hertz == 0:
-            by = who or "by another source"
-            return f"it is at 0 Hz and still enabled {by}: a reference turns it at once."
-        if why := run_by_others(self.session):
+        if hertz != 0 and (why := run_by_others(self.session)):
             return why
-        return f"it answers and runs on; it is commanded {who or 'by another source'}."
+        texts = STILL_ENABLED if hertz == 0 else RUNS_ON
+        if state.local:
+            return texts["local"]
+        return texts["channel" if state.channel else "unknown"].format(channel=state.channel)
 
     async def _motion(self, chart: Chart) -> tuple[str, float | None]:
         """Read the kind of state, and the output frequency in Hz; None if it is not known."""

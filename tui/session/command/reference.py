@@ -14,6 +14,7 @@ from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 from tui.drive.errors import UnitRefused, ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity, ScaleWhen
+from tui.drive.sentences import any_of
 from tui.drive.shown import depends_on, number_of, raw_of_text
 from tui.drive.taught_profile import reference_of
 from tui.drive.units import factor_between, spelled
@@ -110,17 +111,15 @@ def taught_limit(profile: Profile, code: str) -> Parameter | None:
 
 def no_place(profile: Profile, unit: str) -> str:
     """Return why a drive takes no reference in a unit, and what to do."""
-    text = f"No available manual says where {profile.name} takes a reference in {unit}"
+    text = f"No available manual says where {profile.name} takes a reference in {unit}."
     ways = [reference.parameter for reference in profile.data.teachable_references]
     if not ways:
-        return f"{text}; give it at the drive."
+        return f"{text} Give it at the drive."
     code = ways[0]
     if code not in profile.taught:
-        return (
-            f"{text}. Give it at the drive, or teach {code}: L in the panel, or drivepanel teach."
-        )
+        return f"{text} Give it at the drive, or teach {code}: L in the panel, or drivepanel teach."
     return (
-        f"{text}. {code} was taught; R in the panel, or drivepanel teach {code} --reference, makes"
+        f"{text} {code} was taught; R in the panel, or drivepanel teach {code} --reference, makes"
         " it the reference."
     )
 
@@ -185,16 +184,20 @@ def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str
     now, reading = convert_reference(profile, wanted.requested, readings), readings.get(code)
     value = reading_of(reading).value if reading is not None else None
     if value is None or value.number is None:
-        return f"{code} could not be read back{f': {reading.error}' if reading else ''}"
+        why = reading.error if reading else ""
+        return f"{code} could not be read back: {why}" if why else f"{code} could not be read back"
     same = now.parameter.code == code and value.unit == now.unit
     if same and abs(value.number - now.number) <= min(now.step, wanted.step):
         return ""
-    held = value.display
     if same and wanted.is_converted:
         known, unit = ReferenceUnits(profile, readings), wanted.requested.rpartition(" ")[2]
         number = known.converted(value.number, value.unit, unit, known.whole(wanted.parameter))
-        held += f" ({_tidy(number)} {unit})" if number is not None else ""
-    return f"{code} holds {held}, {wanted.requested} was requested"
+        if number is not None:
+            return (
+                f"{code} holds {value.display} ({_tidy(number)} {unit}), {wanted.requested} was"
+                " requested"
+            )
+    return f"{code} holds {value.display}, {wanted.requested} was requested"
 
 
 def reference_limits(
@@ -248,7 +251,7 @@ def _placed(
     own = known.unit(places[0])
     raise UnitRefused(
         f"{text!r} cannot be converted: {places[0].code} takes its reference in"
-        f" {' or '.join(_accepted(known))}. Type it like {EXAMPLES.get(own, f'5{own}')}."
+        f" {any_of(_accepted(known))}. Type it like {EXAMPLES.get(own, f'5{own}')}."
     )
 
 

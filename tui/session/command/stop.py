@@ -50,9 +50,12 @@ from .stop_report import (
     Phase,
     StopReport,
     StopSummary,
+    message_text,
     not_stopped,
 )
 from .under_way import UnderWay, watch_first_frames
+
+STOP_WAITS = "The stop waits for the line."
 
 log = logging.getLogger(__name__)
 
@@ -180,7 +183,7 @@ class Stopper:
                 return []
             before.stop.over = True  # this one sends what that one has not
             before.worker.cancel()
-        self._say(session, Phase.SENDING, "stop waits for the line", ordered)
+        self._say(session, Phase.SENDING, STOP_WAITS, ordered)
         writer = Writer(session, self._journal, None)
         stop = MotorStop(session, writer, order, ordered, self._say, wave=wave)
         worker = self._line.spawn(partial(self._stop, stop), f"stop {device}")
@@ -224,9 +227,7 @@ class Stopper:
         if not same:
             if self._events is not None:
                 kind = "failed" if phase in NOT_STOPPING else "stop"
-                head = "Stopping: " if phase is Phase.STOPPING else ""
-                message = f"{head}{text}" if head else f"{text[:1].upper()}{text[1:]}"
-                self._events.add(kind, message, session.device)
+                self._events.add(kind, message_text(phase, text), session.device)
             log.info("stop of device %s: %s, %s", session.device, phase, text)
 
     async def _behind_wave(

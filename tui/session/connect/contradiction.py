@@ -64,6 +64,12 @@ async def read_status(line: Askable, device: int, profile: Profile, priority: Pr
     return True
 
 
+_OTHER_FAMILY = (
+    "Device {device} says it is {reference}, {family}: the profile {profile} does not fit it."
+)
+_UNKNOWN_KIND = "Device {device} says it is {reference}: the profile {profile} does not fit it."
+
+
 def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
     """Return how a drive contradicts its profile, for a person; empty if it does not.
 
@@ -76,8 +82,10 @@ def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
         return ""
     names = {listing.id: listing.name for listing in library.listings()}
     family = names.get(identity.candidates[0], "") if identity.candidates else ""
-    says = f"{identity.reference}, {family}" if family else identity.reference
-    return f"Device {identity.device} says it is {says}: it is not {_with_article(profile.name)}."
+    text = _OTHER_FAMILY if family else _UNKNOWN_KIND
+    return text.format(
+        device=identity.device, reference=identity.reference, family=family, profile=profile.name
+    )
 
 
 def _may_be(reference: str, profile: Profile) -> bool:
@@ -90,7 +98,3 @@ def _may_be(reference: str, profile: Profile) -> bool:
     while not all(prefix.startswith(stem) for prefix in prefixes):
         stem = stem[:-1]
     return reported.startswith(stem) or stem.startswith(reported)
-
-
-def _with_article(name: str) -> str:
-    return f"{'an' if name[:1].upper() in tuple('AEIOU') else 'a'} {name}"

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineError
 from tui.bus.trace import Frame
+from tui.drive.sentences import first_of
 from tui.wire.frames import is_whole
 from tui.wire.overheard import OverheardRequest, overheard_request
 
@@ -43,8 +44,8 @@ class Overheard:
         """The other master in a sentence: its requests by address; empty if there is none."""
         if self.requests:
             requested = dict.fromkeys(request.device for request in self.requests)
-            reported = "; ".join(f"address {device}: {self._of(device)}" for device in requested)
-            return f"Another master polls drives on this line. {reported[0].upper()}{reported[1:]}."
+            reported = [f"Address {device}: {self._of(device)}." for device in requested]
+            return " ".join(["Another master polls drives on this line.", *reported])
         if self.answered:
             who = addresses_text(self.answered)
             return f"Another master polls drives on this line: {who} answered it."
@@ -58,11 +59,8 @@ class Overheard:
 
     def _of(self, device: int) -> str:
         """Return the requests to one address."""
-        texts = list(
-            dict.fromkeys(request.text for request in self.requests if request.device == device)
-        )
-        more = len(texts) - TEXTS_OF_EACH
-        return ", ".join(texts[:TEXTS_OF_EACH]) + (f" and {more} more" if more > 0 else "")
+        texts = dict.fromkeys(request.text for request in self.requests if request.device == device)
+        return first_of([*texts], TEXTS_OF_EACH)
 
 
 def overheard(frames: Iterable[Frame], since: float) -> Overheard:

@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tui.bus.link import SerialLink
-from tui.drive.finding import LineSetting, families_at, names_text
+from tui.drive.finding import LineSetting, families_at
+from tui.drive.sentences import all_of
 
 from .address_prober import known_profiles, probers_of
 
@@ -29,8 +30,8 @@ class ScanEstimate:
         bauds = [f"{baud}" for baud in dict.fromkeys(setting.baud for setting in settings)]
         can = families_at(known_profiles(), settings)
         return (
-            f"Left are {names_text(sorted(bauds, key=int))} baud: {self.seconds(settings):.0f} s"
-            f" more, for {names_text(can)} alone. {ends} ends it."
+            f"Left are {all_of(sorted(bauds, key=int))} baud: {self.seconds(settings):.0f} s"
+            f" more, for {all_of(can)} alone. {ends} ends it."
         )
 
 

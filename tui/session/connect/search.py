@@ -97,13 +97,12 @@ class Search:
     @property
     def text(self) -> str:
         """Progress as a short text."""
-        found = f"{len(self.answered)} found"
+        found = len(self.answered)
         if self.ended:
-            return f"{self.ended}, {found}"
-        return f"{self.requested} of {self.of} again" if self.again else self._first_round(found)
-
-    def _first_round(self, found: str) -> str:
-        return f"{self.requested} of {self.of}, {found}"
+            return f"{self.ended}, {found} found"
+        if self.again:
+            return f"{self.requested} of {self.of} again"
+        return f"{self.requested} of {self.of}, {found} found"
 
     async def run(self, line: ModbusLine, found: Found) -> None:
         """Run the search; calls `found` for every address that is not silent.

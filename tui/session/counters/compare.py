@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 from typing import Literal
 
 from tui.bus.api import TURNAROUND_EDGES, DeviceCounters, LineCounters
+from tui.drive.sentences import counted
 
 MODULO = 0x10000
 MOST = 0xFFFF
@@ -123,14 +124,53 @@ def frames_since(before: int, now: int, sent: Bounds) -> int | None:
     return None if now < before and found >= sent.high + STRANGE else found
 
 
+_OTHER_PORT = (
+    "The drive answered 1 frame, but counted {frames}. So these counters belong to another port of"
+    " the drive, or were reset.",
+    "The drive answered {count} frames, but counted {frames}. So these counters belong to another"
+    " port of the drive, or were reset.",
+)
+_NEVER_ARRIVED = (
+    "The drive did not count 1 frame that was sent: lost on the way to it, or with a damaged"
+    " address. Check its connector, the polarity and the termination.",
+    "The drive did not count {count} frames that were sent: lost on the way to it, or with a"
+    " damaged address. Check its connector, the polarity and the termination.",
+)
+_DAMAGED_THERE = (
+    "The drive received 1 frame damaged: noise on the way to it. Check the shield, the termination,"
+    " the polarization, and motor cables close to the line.",
+    "The drive received {count} frames damaged: noise on the way to it. Check the shield, the"
+    " termination, the polarization, and motor cables close to the line.",
+)
+_NOT_ANSWERED = (
+    "The drive received 1 frame whose reply did not arrive: lost or damaged on the way back, or"
+    " later than the timeout.",
+    "The drive received {count} frames whose replies did not arrive: lost or damaged on the way"
+    " back, or later than the timeout.",
+)
+_FOREIGN = (
+    "The drive counted 1 frame more than this program sent: another master polls it, or a gateway"
+    " repeats requests.",
+    "The drive counted {count} frames more than this program sent: another master polls it, or a"
+    " gateway repeats requests.",
+)
+_DAMAGED_HERE = (
+    "1 frame came back damaged: noise, two devices that answer together, or a wrong format.",
+    "{count} frames came back damaged: noise, two devices that answer together, or a wrong format.",
+)
+_UNANSWERED = (
+    "1 frame got no reply. Only counters in the drive could show if it was lost on the way there or"
+    " on the way back.",
+    "{count} frames got no reply. Only counters in the drive could show if they were lost on the"
+    " way there or on the way back.",
+)
+
+
 def differences(found: Comparison) -> list[Difference]:
     """Return the certain findings of the drive's counters; empty if all agrees."""
     reported = [Difference("counted-anew", 0, COUNTED_ANEW)] if found.anew else []
     if found.counts_this_line is False:
-        text = (
-            f"The drive answered {_frames(found.answered.low)}, but counted {found.frames}. So"
-            " these counters belong to another port of the drive, or were reset."
-        )
+        text = counted(found.answered.low, *_OTHER_PORT, frames=found.frames)
         return [*reported, Difference("another-port", found.answered.low - found.frames, text)]
     return [*reported, *_differences(found)]
 
@@ -138,35 +178,15 @@ def differences(found: Comparison) -> list[Difference]:
 def _differences(found: Comparison) -> Iterator[Difference]:
     frames, damaged = found.frames, found.damaged
     if (lost := found.sent.low - frames) > 0:
-        yield Difference(
-            "never-arrived",
-            lost,
-            f"The drive did not count {_frames(lost)} that were sent: lost on the way to it, or"
-            " with a damaged address. Check its connector, the polarity and the termination.",
-        )
+        yield Difference("never-arrived", lost, counted(lost, *_NEVER_ARRIVED))
     if damaged > 0:
-        yield Difference(
-            "damaged-there",
-            damaged,
-            f"The drive received {_frames(damaged)} damaged: noise on the way to it. Check the"
-            " shield, the termination, the polarization, and motor cables close to the line.",
-        )
+        yield Difference("damaged-there", damaged, counted(damaged, *_DAMAGED_THERE))
     # foreign frames may have been answered or not, so they do not count
     missed = min(frames, found.sent.low) - damaged - found.answered.high
     if missed > 0:
-        yield Difference(
-            "not-answered",
-            missed,
-            f"The drive received {_frames(missed)} whose replies did not arrive: lost or damaged on"
-            " the way back, or later than the timeout.",
-        )
+        yield Difference("not-answered", missed, counted(missed, *_NOT_ANSWERED))
     if (foreign := frames - found.sent.high) > 0:
-        yield Difference(
-            "not-from-here",
-            foreign,
-            f"The drive counted {_frames(foreign)} more than this program sent: another master"
-            " polls it, or a gateway repeats requests.",
-        )
+        yield Difference("not-from-here", foreign, counted(foreign, *_FOREIGN))
 
 
 def own_differences(ours: DeviceCounters) -> list[Difference]:
@@ -176,22 +196,12 @@ def own_differences(ours: DeviceCounters) -> list[Difference]:
     """
     found = []
     if ours.checksum:
-        text = (
-            f"{_frames(ours.checksum)} came back damaged: noise, two devices that answer together,"
-            " or a wrong format."
-        )
+        text = counted(ours.checksum, *_DAMAGED_HERE)
         found.append(Difference("damaged-here", ours.checksum, text))
     if ours.timeouts:
-        text = (
-            f"{_frames(ours.timeouts)} got no reply. Only counters in the drive could show if they"
-            " were lost on the way there or on the way back."
-        )
+        text = counted(ours.timeouts, *_UNANSWERED)
         found.append(Difference("no-answer", ours.timeouts, text))
     return found
-
-
-def _frames(count: int) -> str:
-    return f"{count} frame{'' if count == 1 else 's'}"
 
 
 def device_since(now: DeviceCounters, before: DeviceCounters) -> DeviceCounters:

@@ -12,6 +12,7 @@ from tui.bus.link import TcpLink
 from tui.bus.trace import Frame
 from tui.drive.chart import watched_codes
 from tui.drive.profile.schema import PortCounters
+from tui.drive.sentences import counted
 
 from ..connect.other_masters import overheard
 from ..diagnosis.asking import last_time
@@ -52,9 +53,14 @@ def stray_difference(
         (found.foreign, "replies of other addresses"),
     )
     seen = ", ".join(f"{number} {text}" for number, text in kinds if number) or LIKELY
-    master = "" if tcp or not (heard := overheard(frames, since)).requests else f" {heard.text}"
-    whole = "1 frame answers" if count == 1 else f"{count} frames answer"
-    text = f"{whole} no program's request: {seen}.{master} Find the cause with `drivepanel why`."
+    master = [] if tcp or not (heard := overheard(frames, since)).requests else [heard.text]
+    text = counted(
+        count,
+        "1 frame answers no program's request: {seen}.",
+        "{count} frames answer no program's request: {seen}.",
+        seen=seen,
+    )
+    text = " ".join([text, *master, "Find the cause with `drivepanel why`."])
     return [Difference("strays", count, text)]
 
 
@@ -112,8 +118,8 @@ class CountersNow:
         """Sentence to show if there are no differences."""
         comparison = self.compared
         if comparison is None:
-            rest = "" if self.drive else " The drive reports no counters of its own."
-            return f"Frames sent: {self.since.requests}. None was lost.{rest}"
+            text = f"Frames sent: {self.since.requests}. None was lost."
+            return text if self.drive else f"{text} The drive reports no counters of its own."
         return f"Frames counted by the drive: {comparison.frames}. All were sent here and answered."
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 
 from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
 from tui.bus.limits import STANDARD_EXCEPTIONS
+from tui.drive.sentences import all_of
 
 from . import next_steps as steps
 from .evidence import DiagnosticEvidence
@@ -33,11 +34,18 @@ def _renumbered(sight: DiagnosticEvidence) -> bool:
     return bool(sight.adapter.was) and (bool(sight.adapter.now) or not _not_there(sight))
 
 
+_RENUMBERED = {
+    (True, True): "{path} is not there: the adapter that it was is {now} now.",
+    (True, False): "{path} is not there: the adapter that it was is not plugged in.",
+    (False, True): "{path} is another adapter than it was; the one that it was is {now} now.",
+    (False, False): "{path} is another adapter than it was; the one that it was is not plugged in.",
+}
+"""By whether the port is missing, and whether its adapter has another port."""
+
+
 def _says_renumbered(sight: DiagnosticEvidence) -> str:
-    now = f"is {sight.adapter.now} now" if sight.adapter.now else "is not plugged in"
-    if _not_there(sight):
-        return f"{sight.path} is not there: the adapter that it was {now}."
-    return f"{sight.path} is another adapter than it was; the one that it was {now}."
+    text = _RENUMBERED[_not_there(sight), bool(sight.adapter.now)]
+    return text.format(path=sight.path, now=sight.adapter.now)
 
 
 def _busy(sight: DiagnosticEvidence) -> bool:
@@ -53,7 +61,9 @@ def _busy(sight: DiagnosticEvidence) -> bool:
 def _describe_busy(sight: DiagnosticEvidence) -> str:
     port = sight.port
     if isinstance(sight.trouble, PortBusy):
-        by = sight.trouble.holder or (port.holder if port else "") or "another program"
+        by = sight.trouble.holder or (port.holder if port else "")
+        if not by:
+            return f"{sight.path} is in use by another program."
         return f"{sight.path} is in use by {by}."
     if isinstance(sight.trouble, NotShared) or port is None or sight.owner_frozen:
         return first_sentence(str(sight.trouble))
@@ -67,13 +77,22 @@ def _forbidden(sight: DiagnosticEvidence) -> bool:
     return port is not None and port.there and not port.permitted
 
 
+_GROUP_FROM_LOGIN = (
+    "{port.path} may be used by the group {port.group} alone, and {port.user} is in it since the"
+    " next log-in only."
+)
+_NOT_IN_GROUP = (
+    "{port.path} may be used by the group {port.group} alone, and {port.user} is not in it."
+)
+
+
 def _says_forbidden(sight: DiagnosticEvidence) -> str:
     port = sight.port
     assert port is not None
     if not port.group:
         return f"{port.user or 'This user'} may not use {port.path}, and no group of users may."
-    why = "is in it since the next log-in only" if port.in_group else "is not in it"
-    return f"{port.path} may be used by the group {port.group} alone, and {port.user} {why}."
+    text = _GROUP_FROM_LOGIN if port.in_group else _NOT_IN_GROUP
+    return text.format(port=port)
 
 
 def _slow_adapter(sight: DiagnosticEvidence) -> bool:
@@ -100,27 +119,28 @@ def _garbled(sight: DiagnosticEvidence) -> bool:
     return bool(heard.garbage) or bool(sight.broken)
 
 
+_WRONG_SPEED = {
+    (False, False): "The baud or the format of the line is not that of the drive: {count} bytes"
+    " came back that form no frame.",
+    (True, False): "The baud or the format of the line is not that of the drive: the port counted"
+    " {port}.",
+    (False, True): "The baud or the format of the line is not that of the drive: {reported}.",
+    (True, True): "The baud or the format of the line is not that of the drive: the port counted"
+    " {port}; {reported}.",
+}
+"""By whether the port has counted errors, and whether the number of bytes indicates a speed."""
+
+
 def _says_garbled(sight: DiagnosticEvidence) -> str:
     errors, reported = sight.errors, speed_text(sight)
-    counted = [
-        f"{count} {what}"
-        for count, what in (
-            (errors.framing, "without a stop bit"),
-            (errors.parity, "with a wrong parity"),
-            (errors.breaks, "breaks"),
-        )
-        if count
-    ]
-    if counted:
-        seen = f"the port counted {' and '.join(counted)}"
-        reported = f"{seen}; {reported}" if reported else seen
-    return (
-        f"The baud or the format of the line is not that of the drive: {reported or _loose(sight)}."
+    counts = (
+        (errors.framing, "{count} without a stop bit"),
+        (errors.parity, "{count} with a wrong parity"),
+        (errors.breaks, "{count} breaks"),
     )
-
-
-def _loose(sight: DiagnosticEvidence) -> str:
-    return f"{sight.heard.garbage} bytes came back that form no frame"
+    port = [text.format(count=count) for count, text in counts if count]
+    text = _WRONG_SPEED[bool(port), bool(reported)]
+    return text.format(port=all_of(port), reported=reported, count=sight.heard.garbage)
 
 
 def _late(sight: DiagnosticEvidence) -> bool:
@@ -144,15 +164,17 @@ def _damaged(sight: DiagnosticEvidence) -> bool:
     return bool(heard.damaged) or bool(heard.answered and (heard.garbage or sight.broken))
 
 
+_DAMAGED = "The drive answers, and {count} of {of} answers came damaged: the checksum does not fit."
+_DAMAGED_AT_PORT = (
+    "The drive answers, and {count} of {of} answers came damaged: the checksum does not fit"
+    " ({broken} characters the port itself saw broken)."
+)
+
+
 def _says_damaged(sight: DiagnosticEvidence) -> str:
     heard = sight.heard
-    broken = f" ({sight.broken} characters the port itself saw broken)" if sight.broken else ""
-    count = heard.damaged or 1
-    return (
-        f"The drive answers, and {count} of {heard.requested} answers came damaged: the checksum"
-        " does"
-        f" not fit{broken}."
-    )
+    text = _DAMAGED_AT_PORT if sight.broken else _DAMAGED
+    return text.format(count=heard.damaged or 1, of=heard.requested, broken=sight.broken)
 
 
 def _gateway_codes(sight: DiagnosticEvidence) -> list[int]:
@@ -165,13 +187,25 @@ def _refused(sight: DiagnosticEvidence) -> bool:
     return bool(sight.heard.exceptions) and not sight.heard.answered and not _gateway_codes(sight)
 
 
+_REFUSES = "The drive is there, and refuses what is asked with exception {code}."
+_REFUSES_BECAUSE = "The drive is there, and refuses what is asked with exception {code}: {meaning}."
+
+
 def _says_refused(sight: DiagnosticEvidence) -> str:
     code = sight.heard.exceptions[-1]
     known = sight.profile.data.exceptions if sight.profile is not None else []
     meaning = next((e.meaning for e in known if e.code == code), STANDARD_EXCEPTIONS.get(code, ""))
-    why = f": {meaning.rstrip('.')}" if meaning else ""
-    return f"The drive is there, and refuses what is asked with exception {code}{why}."
+    text = _REFUSES_BECAUSE if meaning else _REFUSES
+    return text.format(code=code, meaning=meaning.removesuffix("."))
 
+
+_OTHER_FUNCTION = (
+    "Address {sight.device} answers something else than asked: function {sight.heard.functions[0]}."
+)
+_OTHER_COUNT = (
+    "Address {sight.device} answers something else than asked: not as many registers as were asked"
+    " for."
+)
 
 LADDER: tuple[Check, ...] = (
     Check("renumbered", _renumbered, _says_renumbered, steps.find_adapter),
@@ -229,14 +263,7 @@ LADDER: tuple[Check, ...] = (
     Check(
         "wrong-function",
         lambda s: bool(s.heard.functions or s.heard.misshapen),
-        lambda s: (
-            f"Address {s.device} answers something else than asked: "
-            + (
-                f"function {s.heard.functions[0]}."
-                if s.heard.functions
-                else "not as many registers as were asked for."
-            )
-        ),
+        lambda s: (_OTHER_FUNCTION if s.heard.functions else _OTHER_COUNT).format(sight=s),
         steps.find_second_master,
     ),
     Check(
@@ -289,11 +316,15 @@ def diagnosed(sight: DiagnosticEvidence) -> Diagnosis:
     heard = sight.heard
     if not heard.requested:
         return Diagnosis(UNOPENED, NOTHING_SEEN, (OPEN_IT,), sight)
-    after = f", {sight.turnaround * 1000:.0f} ms after each request" if sight.turnaround else ""
     measure = sight.measure
     sent = heard.requested + (measure.requested if measure is not None else 0)
     answered = heard.answered + (measure.answered if measure is not None else 0)
-    text = f"Address {sight.device} answers: {answered} of {sent} requests{after}."
+    text = f"Address {sight.device} answers: {answered} of {sent} requests."
+    if sight.turnaround:
+        text = (
+            f"Address {sight.device} answers: {answered} of {sent} requests,"
+            f" {sight.turnaround * 1000:.0f} ms after each request."
+        )
     if sight.idle:
-        text += f" The gateway kept the connection for {sight.idle:.0f} s without a request."
+        text = f"{text} The gateway kept the connection for {sight.idle:.0f} s without a request."
     return Diagnosis(ANSWERS, text, (), sight)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from tui.bus.link import SerialLink
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import LinkSetting
+from tui.drive.sentences import all_of, any_of
 
 from .evidence import DiagnosticEvidence
 
@@ -27,8 +28,10 @@ def speed_hint(sight: DiagnosticEvidence) -> str:
         return ""
     known = profile.data.link
     if known.bauds and link.baud not in known.bauds:
-        rates = f"{min(known.bauds)} to {max(known.bauds)}"
-        return f"{link.baud} bit/s does not work on {profile.name}: it has {rates}."
+        return (
+            f"{link.baud} bit/s does not work on {profile.name}: it has {min(known.bauds)} to"
+            f" {max(known.bauds)}."
+        )
     if known.formats and link.format not in known.formats:
         return f"{profile.name} has no {link.format}: it has {', '.join(known.formats)}."
     return ""
@@ -45,8 +48,12 @@ def address_hint(sight: DiagnosticEvidence) -> str:
         return f"{sight.profile.name} has addresses {known.first} to {known.last}."
     setting = _code(sight.profile, "address")
     if known.off is not None:
-        left = ", and so it leaves the factory" if known.factory == known.off else ""
-        return f"Address: {setting}. At OFF ({known.off}) it does not answer{left}."
+        if known.factory != known.off:
+            return f"Address: {setting}. At OFF ({known.off}) it does not answer."
+        return (
+            f"Address: {setting}. At OFF ({known.off}) it does not answer, and so it leaves the"
+            " factory."
+        )
     return f"Address: {setting}; it leaves the factory at {known.factory}."
 
 
@@ -65,12 +72,13 @@ def settings_hints(sight: DiagnosticEvidence) -> Iterator[str]:
         return
     known = profile.data.link
     codes = ", ".join(filter(None, (_code(profile, role) for role in SPEED_ROLES)))
-    leaves = f"{profile.name} leaves the factory with {known.baud} {known.format} ({codes})"
-    if isinstance(link, SerialLink):
-        line = "as this line" if as_factory(sight) else f"this line has {link.baud} {link.format}"
-        yield f"Baud and format: {leaves}; {line}."
+    leaves = f"{profile.name} leaves the factory with {known.baud} {known.format} ({codes})."
+    if not isinstance(link, SerialLink):
+        yield f"The gateway sets baud and format. {leaves}"
+    elif as_factory(sight):
+        yield f"Baud and format: {leaves} So does this line."
     else:
-        yield f"Baud and format, which the gateway sets: {leaves}."
+        yield f"Baud and format: {leaves} This line has {link.baud} {link.format}."
     for setting in known.settings:
         if setting.role == "format" and len(setting.choices) == 1:
             port = setting.note.rstrip(".") or setting.parameter
@@ -118,22 +126,22 @@ def _polarity(profile: Profile) -> str:
         if rule.subject.casefold().startswith(NAMED):
             return rule.rule
     named = [
-        f"{signal.signal} is {', '.join(signal.names.values())}"
+        f"{signal.signal} is {', '.join(signal.names.values())}."
         for signal in data.wiring.signals
         if signal.signal.casefold() in USED_PINS[:2]
     ]
     if named:
-        return f"{'; '.join(named)}. {BOTH_WAYS}"
+        return " ".join([*named, BOTH_WAYS])
     turned = {
         pin.signal
         for connector in data.connectors
         for pin in connector.pins
         if pin.note.casefold().startswith("inverted")
     }
-    return f"{' and '.join(sorted(turned))} are the inverted wires. {BOTH_WAYS}" if turned else ""
+    return f"{all_of(sorted(turned))} are the inverted wires. {BOTH_WAYS}" if turned else ""
 
 
 def _code(profile: Profile, role: str) -> str:
     """Return the drive's parameters for one setting of its line."""
     found: list[LinkSetting] = [s for s in profile.data.link.settings if s.role == role]
-    return " or ".join(dict.fromkeys(setting.parameter for setting in found))
+    return any_of([*dict.fromkeys(setting.parameter for setting in found)]) if found else ""

@@ -14,18 +14,31 @@ SAME_SPEED = 1.3
 """Greatest ratio of received to due bytes that still indicates the same speed."""
 
 
+_SAME_SPEED = "{came} bytes came where {due} were due: the speed is right, the format hardly"
+_SLOWER = "{came} bytes came where {due} were due: the drive sends slower"
+_SLOWER_AT = (
+    "{came} bytes came where {due} were due: the drive sends slower, at {baud} bit/s most likely"
+)
+_FASTER = "{came} bytes came where {due} were due: the drive sends faster"
+_FASTER_AT = (
+    "{came} bytes came where {due} were due: the drive sends faster, at {baud} bit/s most likely"
+)
+
+
 def speed_text(sight: DiagnosticEvidence) -> str:
     """Return the conclusion from the number of bytes: a receiver at half the speed sees half of
     them."""
     came, due = sight.heard.compared
     if not came or not due:
         return ""
-    counts = f"{came} bytes came where {due} were due"
-    if same_speed(sight):
-        return f"{counts}: the speed is right, the format hardly"
     likely = likely_baud(sight)
-    at = f", at {likely} bit/s most likely" if likely else ""
-    return f"{counts}: the drive sends {'slower' if came > due else 'faster'}{at}"
+    if same_speed(sight):
+        text = _SAME_SPEED
+    elif came > due:
+        text = _SLOWER_AT if likely else _SLOWER
+    else:
+        text = _FASTER_AT if likely else _FASTER
+    return text.format(came=came, due=due, baud=likely)
 
 
 def same_speed(sight: DiagnosticEvidence) -> bool:

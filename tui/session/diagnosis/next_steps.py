@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from tui.bus.errors import PortMissing
 from tui.bus.link import SerialLink
+from tui.drive.sentences import any_of
 
 from .evidence import DiagnosticEvidence
 from .family import address_hint, as_factory, settings_hints, speed_hint, wiring_hints
@@ -100,7 +101,8 @@ def mend_settings(sight: DiagnosticEvidence) -> Iterator[str]:
     if (likely := likely_baud(sight)) and isinstance(sight.link, SerialLink):
         yield f"Close the line and open serial:{sight.path},{likely},{sight.link.format}."
     elif same_speed(sight) and (formats := other_formats(sight)):
-        yield f"Close the line and open it at the same speed with another format: {_any(formats)}."
+        names = any_of(formats)
+        yield f"Close the line and open it at the same speed with another format: {names}."
     yield from settings_hints(sight)
     if sight.profile is None:
         yield NAME_A_FAMILY
@@ -128,8 +130,13 @@ def end_silence(sight: DiagnosticEvidence) -> Iterator[str]:
 
 def search(sight: DiagnosticEvidence) -> Iterator[str]:
     """Suggest a search for the drive by Drive Panel."""
-    settings = ", --all-settings at other baud rates" if isinstance(sight.link, SerialLink) else ""
-    yield f"drivepanel scan, or s on Line, looks for it at other addresses{settings}."
+    if isinstance(sight.link, SerialLink):
+        yield (
+            "drivepanel scan, or s on Line, looks for it at other addresses, --all-settings at"
+            " other baud rates."
+        )
+    else:
+        yield "drivepanel scan, or s on Line, looks for it at other addresses."
 
 
 def wait_longer(sight: DiagnosticEvidence) -> Iterator[str]:
@@ -195,15 +202,10 @@ def ask_otherwise(sight: DiagnosticEvidence) -> Iterator[str]:
         yield f"Other servers in the same drive have addresses of their own: {others}."
 
 
-def _any(names: tuple[str, ...]) -> str:
-    """Join alternative names by "or"."""
-    return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else names[0]
-
-
 def one_master(sight: DiagnosticEvidence) -> Iterator[str]:
     """Steps if another master uses the line."""
     if details := sight.overheard.partition(". ")[2]:
-        yield f"It asks {details[:1].lower()}{details[1:]}"
+        yield details
     yield "Stop the other master, or join it: a line has one. drivepanel listen shows what it asks."
 
 

@@ -75,8 +75,8 @@ def says_sick(kind: SickFrames, sight: DiagnosticEvidence) -> str:
         for frame in SICK_FRAMES
         if frame is not kind and measure.count(frame.kind)
     ]
-    more = f"; also {', '.join(beside)}" if beside else ""
-    return f"In {measure.seconds:.1f} s, {count} of {measure.requested} {kind.text}{more}."
+    text = f"In {measure.seconds:.1f} s, {count} of {measure.requested} {kind.text}"
+    return f"{text}; also {', '.join(beside)}." if beside else f"{text}."
 
 
 def says_two_drives(sight: DiagnosticEvidence) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from tui.bus.errors import ONE_BEHIND
+from tui.drive.sentences import sentence
 
 from . import next_steps as steps
 from .evidence import DiagnosticEvidence
@@ -43,7 +44,7 @@ class Check:
 
 def first_sentence(text: str) -> str:
     """The first sentence of a text."""
-    return text.partition(". ")[0].rstrip(".") + "."
+    return sentence(text.partition(". ")[0])
 
 
 def _measure(sight: DiagnosticEvidence) -> Measure:
@@ -68,8 +69,10 @@ def _says_behind(sight: DiagnosticEvidence) -> str:
     count = sight.measure
     if sight.behind or count is None:
         return f"{ONE_BEHIND}: each request gets the reply to the one before."
-    many = f"{count.behind} of {count.requested} requests"
-    return f"{ONE_BEHIND}: {many} got the reply to the request before."
+    return (
+        f"{ONE_BEHIND}: {count.behind} of {count.requested} requests got the reply to the request"
+        " before."
+    )
 
 
 def _sureness_of_behind(sight: DiagnosticEvidence) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -10,8 +10,10 @@ from tui.bus.limits import STANDARD_EXCEPTIONS
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
+from tui.drive.sentences import counted, first_of
 from tui.drive.shown import number_of
 
+from . import summary_texts as texts
 from .families import AssumedProfile, Families
 from .listener import LineListener
 from .tally import DriveTally, LineTally, WriteTally
@@ -90,18 +92,14 @@ def summary_lines(summary: ListeningSummary) -> list[str]:
     """The summary for a person; lines of a drive begin with two spaces."""
     tally, lines = summary.tally, []
     pace = tally.exchanges / summary.seconds if summary.seconds else 0.0
-    load = "" if summary.load is None else f", line {summary.load * 100:.0f} % busy"
-    lines.append(
-        f"Listened {summary.seconds:.1f} s: {_many(tally.exchanges, 'exchange')},"
-        f" {pace:.1f} a second{load}."
-    )
+    text = counted(tally.exchanges, *texts.LISTENED_TEXTS, seconds=summary.seconds, pace=pace)
+    if summary.load is not None:
+        text = f"{text} The line is {summary.load * 100:.0f} % busy."
+    lines.append(text)
     if not tally.bytes:
         lines.append("Nothing was received. Check that a master polls, and that A and B are wired.")
     elif not tally.frames:
-        lines.append(
-            f"{_many(tally.noise_bytes, 'byte')} received, but no whole frame. Check the baud rate"
-            " and the format."
-        )
+        lines.append(counted(tally.noise_bytes, *texts.NO_FRAME_TEXTS))
     for drive in summary.drives:
         lines += _drive_lines(drive)
     return [*lines, *_line_troubles(summary)]
@@ -114,7 +112,8 @@ def _drive_lines(drive: DriveSummary) -> Iterator[str]:
     else:
         yield f"Device {tally.device}: {family_text(drive.family)}"
     if drive.silent and tally.device:
-        yield f"  no answer to {_many(tally.requests, 'request')}"
+        single, several = "  no answer to 1 request", "  no answer to {count} requests"
+        yield counted(tally.requests, single, several)
     elif tally.device:
         yield f"  {_drive_request_text(drive)}"
     yield f"  {_commanded_text(drive)}"
@@ -130,52 +129,51 @@ def family_text(family: AssumedProfile | None) -> str:
     """Return a family, with its certainty."""
     if family is None:
         return "family unknown; name it with -p"
-    or_ = f", or {', '.join(family.others)}" if family.others else ""
-    return f"{family.profile.name} ({HOW_SURE[family.how]}{or_})"
+    name, how = family.profile.name, HOW_SURE[family.how]
+    return f"{name} ({how}, or {', '.join(family.others)})" if family.others else f"{name} ({how})"
 
 
 def _drive_request_text(drive: DriveSummary) -> str:
     tally = drive.tally
     text = "polled once"
     if drive.pace is not None:
-        text = f"polled {_pace_text(drive.pace)}, longest pause {tally.longest_pause:.2f} s"
-    if tally.turnaround is not None:
-        text += f"; answers in {tally.turnaround * 1000:.1f} ms"
-        text += f" ({tally.turnaround_least * 1000:.1f} to {tally.turnaround_most * 1000:.1f})"
-    return text
-
-
-def _pace_text(pace: float) -> str:
-    return f"{pace:.1f} times a second" if pace >= 1 else f"every {1 / pace:.1f} s"
+        text = texts.POLLED_OFTEN_TEXT if drive.pace >= 1 else texts.POLLED_SELDOM_TEXT
+        text = text.format(pace=drive.pace, cycle=1 / drive.pace, longest=tally.longest_pause)
+    if tally.turnaround is None:
+        return text
+    least, most = tally.turnaround_least * 1000, tally.turnaround_most * 1000
+    return f"{text}; answers in {tally.turnaround * 1000:.1f} ms ({least:.1f} to {most:.1f})"
 
 
 def _commanded_text(drive: DriveSummary) -> str:
     writes = drive.tally.writes
     commands = {code: tally for code, tally in writes.items() if tally.commands}
     others = {code: tally for code, tally in writes.items() if not tally.commands}
-    parts = []
-    if commands:
-        parts.append(f"commanded by the master: {_writes_text(commands)}")
-    if others:
-        parts.append(f"written: {_writes_text(others)}")
-    return "; ".join(parts) or "read only: the master on this line does not command it"
+    text = texts.COMMANDED_TEXTS[bool(commands), bool(others)]
+    return text.format(commands=_writes_text(commands), others=_writes_text(others))
 
 
 def _writes_text(writes: dict[str, WriteTally]) -> str:
     shown = [
-        f"{code} {tally.text} {'once' if tally.every is None else f'every {tally.every:.2f} s'}"
-        for code, tally in list(writes.items())[:CODES_SHOWN]
+        f"{code} {tally.text} once"
+        if tally.every is None
+        else f"{code} {tally.text} every {tally.every:.2f} s"
+        for code, tally in writes.items()
     ]
-    return _listed(shown, len(writes))
+    return first_of(shown, CODES_SHOWN)
 
 
 def feeding_text(feeding: Feeding) -> str:
     """Return a text on a drive's timeout: whether polling prevents it, and with what margin."""
     heard = feeding.known == "heard"
-    known = "as read on the line" if heard else "factory setting; no master has read it"
     if feeding.seconds is None or feeding.margin is None:
-        follows = ": it does not react to a communication loss" if heard else ""
-        return f"timeout {feeding.code} off ({known}){follows}"
+        if not heard:
+            return f"timeout {feeding.code} off (factory setting; no master has read it)"
+        return (
+            f"timeout {feeding.code} off (as read on the line): it does not react to a"
+            " communication loss"
+        )
+    known = "as read on the line" if heard else "factory setting; no master has read it"
     head = f"timeout {feeding.code} {feeding.seconds:g} s ({known})"
     if not feeding.begun:
         return f"{head}: starts with the first command, and none was sent yet"
@@ -187,19 +185,14 @@ def feeding_text(feeding: Feeding) -> str:
 def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str]:
     tally = drive.tally
     for code, times in sorted(tally.exceptions.items()):
-        yield f"refused {_times(times)}: exception {code}, {exception_meaning(code, profile)}"
+        meaning = exception_meaning(code, profile)
+        yield counted(times, *texts.REFUSED_TIMES_TEXTS, code=code, meaning=meaning)
     if tally.answers["none"] and not drive.silent:
-        yield f"no answer {_times(tally.answers['none'])}"
+        yield counted(tally.answers["none"], "no answer once", "no answer {count} times")
     if tally.answers["damaged"]:
-        yield (
-            f"damaged answer {_times(tally.answers['damaged'])}: noise, or several devices with the"
-            f" address {tally.device}"
-        )
+        yield counted(tally.answers["damaged"], *texts.DAMAGED_TEXTS, device=tally.device)
     if tally.answers["again"]:
-        yield (
-            f"TWO ANSWERS to {_many(tally.answers['again'], 'request')}: do two devices have the"
-            f" address {tally.device}?"
-        )
+        yield counted(tally.answers["again"], *texts.TWO_ANSWERS_TEXTS, device=tally.device)
 
 
 def exception_meaning(code: int, profile: Profile | None) -> str:
@@ -213,61 +206,45 @@ def exception_meaning(code: int, profile: Profile | None) -> str:
 def shorter_text(shorter: ShorterPlan) -> str:
     """Return a shorter read for a master."""
     requests = shorter.plan.requests
-    reads = "; ".join(_request_text(request) for request in requests[:CODES_SHOWN])
-    more = len(requests) - CODES_SHOWN
-    return (
-        f"the master reads {_listed(shorter.codes[:CODES_SHOWN], len(shorter.codes))} in"
-        f" {_many(len(shorter.now), 'request')}, {shorter.now_seconds * 1000:.1f} ms."
-        f" {_many(len(requests), 'request')} would take {shorter.plan.seconds * 1000:.1f} ms:"
-        f" {reads}{f' and {more} more' if more > 0 else ''}"
+    now = counted(
+        len(shorter.now),
+        *texts.READS_NOW_TEXTS,
+        codes=first_of(shorter.codes, CODES_SHOWN),
+        milliseconds=shorter.now_seconds * 1000,
     )
+    plan = counted(
+        len(requests),
+        *texts.WOULD_TAKE_TEXTS,
+        reads=first_of([_request_text(request) for request in requests], CODES_SHOWN, "; "),
+        milliseconds=shorter.plan.seconds * 1000,
+    )
+    return f"{now} {plan}"
 
 
 def _request_text(request: ReadRequest) -> str:
-    return f"{_many(request.count, 'word')} from {request.address}"
+    single, several = "1 word from {address}", "{count} words from {address}"
+    return counted(request.count, single, several, address=request.address)
 
 
 def _line_troubles(summary: ListeningSummary) -> Iterator[str]:
     tally = summary.tally
     if tally.noises and tally.frames:
-        yield (
-            f"Outside frames: {_many(tally.noise_bytes, 'byte')} in {_many(tally.noises, 'place')}"
-            " (noise, collisions, cut frames)."
-        )
+        yield counted(tally.noises, *texts.OUTSIDE_TEXTS, bytes=tally.noise_bytes)
     if tally.crossed:
-        yield (
-            f"A SECOND MASTER? {_many(tally.crossed, 'request')} began while another request still"
-            " waited for its answer."
-        )
+        yield counted(tally.crossed, *texts.SECOND_MASTER_TEXTS)
     if not tally.frames:
         return
     if not summary.reports_silences:
         yield "Gaps between frames are not checked: this port has no baud rate of its own."
         return
     if tally.cut:
-        yield (
-            f"Broken frames: {_many(tally.cut, 'frame')} with an internal pause of up to"
-            f" {tally.longest_cut * 1000:.1f} ms. Strict drives ignore such frames."
-        )
+        yield counted(tally.cut, *texts.BROKEN_TEXTS, pause=tally.longest_cut * 1000)
     if tally.hasty:
-        yield f"Broken gaps: {_many(tally.hasty, 'frame')} began too soon after another."
+        yield counted(tally.hasty, *texts.TOO_SOON_TEXTS)
     if tally.together * 3 > tally.frames:
         yield "The adapter delivers several frames at once: the gaps between them are unknown."
     elif not tally.cut and not tally.hasty:
         yield "The gaps between frames are long enough."
-
-
-def _listed(shown: Sequence[str], count: int) -> str:
-    more = count - len(shown)
-    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
-
-
-def _many(count: int, what: str) -> str:
-    return f"{count} {what}{'' if count == 1 else 's'}"
-
-
-def _times(count: int) -> str:
-    return "once" if count == 1 else f"{count} times"
 
 
 WORTH_TELLING = 0.95

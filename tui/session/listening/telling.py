@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tui.drive.plain import plain
+from tui.drive.sentences import first_of
 
 from .families import Families
 from .listener import DecodedExchange
@@ -56,13 +57,12 @@ def _trouble(reported: DecodedExchange) -> str:
 
 
 def _value_text(value: HeardValue) -> str:
-    return f"{value.code} {'← ' if value.written else ''}{value.value.display}"
+    arrow = "← " if value.written else ""
+    return f"{value.code} {arrow}{value.value.display}"
 
 
 def _drive_request_text(reported: DecodedExchange) -> str:
-    names = requested_names(reported)
-    more = len(names) - CODES_NAMED_AT_MOST
-    return " ".join(names[:CODES_NAMED_AT_MOST]) + (f" and {more} more" if more > 0 else "")
+    return first_of(requested_names(reported), CODES_NAMED_AT_MOST, " ")
 
 
 def _identity_text(device: int, families: Families) -> str:

@@ -138,9 +138,7 @@ class LineAlarms:
         if was is None and self._recorded.get(device) == onset.wall:
             return False  # the same trip, of a drive that was lost in the meantime
         self._recorded[device] = onset.wall
-        what = "tripped" if now.tripped else "in fault when first seen"
-        text = f"{what}: {_called(now)}{_behind(first, now)}."
-        self._events.add("fault", text, device, now.wall)
+        self._events.add("fault", _onset_text(first, now), device, now.wall)
         self._record(now, "tripped" if now.tripped else "seen")
         return True
 
@@ -155,11 +153,18 @@ def _called(fault: PresentFault) -> str:
     return f"{fault.code} {fault.name}".strip() or "a fault whose code was not read"
 
 
-def _behind(first: PresentFault | None, now: PresentFault) -> str:
-    """Return a clause that names the earlier fault of the line; empty if there is none."""
-    if first is None or first.device == now.device or not now.tripped:
-        return ""
-    if not first.tripped:
-        return f"; drive {first.device} was in fault before"
+_TRIPPED = "tripped: {fault}."
+_TRIPPED_AFTER_FAULT = "tripped: {fault}; drive {device} was in fault before."
+_TRIPPED_AFTER_TRIP = "tripped: {fault}; drive {device} tripped first, {at}."
+_SEEN = "in fault when first seen: {fault}."
+
+
+def _onset_text(first: PresentFault | None, now: PresentFault) -> str:
+    """Return a new fault, and the earlier fault of the line if there is one."""
+    if not now.tripped:
+        return _SEEN.format(fault=_called(now))
+    if first is None or first.device == now.device:
+        return _TRIPPED.format(fault=_called(now))
+    text = _TRIPPED_AFTER_TRIP if first.tripped else _TRIPPED_AFTER_FAULT
     at = time.strftime("%H:%M:%S", time.localtime(first.wall))
-    return f"; drive {first.device} tripped first, {at}"
+    return text.format(fault=_called(now), device=first.device, at=at)

@@ -150,11 +150,9 @@ def record_text(
         lines += ["", "## Stored by the drive", "", "| code | name | value |", "|---|---|---|"]
         lines += [f"| {code} | {name} | {value} |" for code, name, value in stored]
     lines += ["", f"## Values of the last {SECONDS_KEPT:g} s", ""]
-    lines.append("| time | state | " + " | ".join(record.headings) + " |")
+    lines.append(f"| time | state | {' | '.join(record.headings)} |")
     lines.append("|---|---|" + "---:|" * len(record.headings))
-    lines += [
-        f"| {_clock(m.wall)} | {m.state} | " + " | ".join(m.texts) + " |" for m in record.moments
-    ]
+    lines += [f"| {_clock(m.wall)} | {m.state} | {' | '.join(m.texts)} |" for m in record.moments]
     lines += ["", f"## Writes by Drive Panel in the last {SECONDS_KEPT:g} s", ""]
     if record.writes:
         lines += ["| time | code | old | new | answer | why |", "|---|---|---|---|---|---|"]

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from typing import Literal, NamedTuple
 
 from tui.bus.api import LastMinute, LineCounters
+from tui.drive.sentences import counted
 
 LEAST_REPLIES = 20
 """Least replies in the last minute for a judgment."""
@@ -94,7 +95,7 @@ def _few_good(
     choose = f"Choose drive {worst} on Line and press N for the cause."
     if None not in poor:
         share = percent(shares[worst]).strip()
-        text = f"{_lost(drives[worst], f' of drive {worst}')} {choose}"
+        text = f"{_lost(drives[worst], worst)} {choose}"
         return LineTrouble("poor", (f"drive {worst} {share:>2} % good", f"drive {worst}", ""), text)
     share = percent(line.share).strip()
     if len(shares) > 1:
@@ -103,24 +104,36 @@ def _few_good(
     return LineTrouble("poor", signs, f"{_lost(line)} {choose}")
 
 
-def _lost(minute: LastMinute, whose: str = "") -> str:
-    return (
-        f"Only {percent(minute.share).strip()} % of {minute.replies} replies{whose} were good in"
-        f" the last minute: {minute.lost} lost, {minute.damaged} damaged."
-    )
+def _lost(minute: LastMinute, drive: int | None = None) -> str:
+    text = _FEW_GOOD if drive is None else _FEW_GOOD_OF_DRIVE
+    return text.format(share=percent(minute.share).strip(), minute=minute, drive=drive)
+
+
+_FEW_GOOD = (
+    "Only {share} % of {minute.replies} replies were good in the last minute: {minute.lost} lost,"
+    " {minute.damaged} damaged."
+)
+_FEW_GOOD_OF_DRIVE = (
+    "Only {share} % of {minute.replies} replies of drive {drive} were good in the last minute:"
+    " {minute.lost} lost, {minute.damaged} damaged."
+)
 
 
 def _foreign(count: int) -> str:
-    frames = "1 foreign frame" if count == 1 else f"{count} foreign frames"
+    frames = counted(
+        count, "1 foreign frame in the last minute.", "{count} foreign frames in the last minute."
+    )
     return (
-        f"{frames} in the last minute. Another master is on this line, or an adapter echoes."
+        f"{frames} Another master is on this line, or an adapter echoes."
         " Press N to find out before you command a motor."
     )
 
 
 def _strays(count: int) -> str:
-    replies = "1 stray reply" if count == 1 else f"{count} stray replies"
+    replies = counted(
+        count, "1 stray reply in the last minute.", "{count} stray replies in the last minute."
+    )
     return (
-        f"{replies} in the last minute. Two drives have one address, or an adapter repeats frames."
+        f"{replies} Two drives have one address, or an adapter repeats frames."
         " Press N to find out before you command a motor."
     )

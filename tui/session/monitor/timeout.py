@@ -9,6 +9,7 @@ from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import CommunicationFault
+from tui.drive.sentences import counted, sentence
 
 from ..drive import DriveSession
 from ..read.presence import look_for_drive, meets_silence
@@ -32,27 +33,36 @@ class TimeoutWarning:
         return self.watch.timeout - self.silent
 
 
+_NO_TIMEOUT = (
+    "{drives}: without communication it goes on: it has no timeout.",
+    "{drives}: without communication each goes on: it has no timeout.",
+)
+_GOES_ON = (
+    "{drives}: without communication it goes on: its reaction is {reaction}.",
+    "{drives}: without communication each goes on: its reaction is {reaction}.",
+)
+_ACTS = (
+    "{drives}: on loss of communication it acts {seconds:g} s after the last request: {reaction}",
+    "{drives}: on loss of communication each acts {seconds:g} s after the last request: {reaction}",
+)
+
+
 def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
     """Return a sentence with the reaction of drives of one family when polling stops."""
-    it = "it" if len(sessions) == 1 else "each"
+    count, names = len(sessions), names_of(sessions)
     if watch is None:
-        return f"{names_of(sessions)}: without communication {it} goes on: it has no timeout."
+        return counted(count, *_NO_TIMEOUT, drives=names)
     if watch.reaction is not None and not watch.acts:
-        reaction = watch.reaction.name
-        return (
-            f"{names_of(sessions)}: without communication {it} goes on: its reaction is {reaction}."
-        )
-    does = watch.reaction.does if watch.reaction else "its own reaction follows"
-    after = f"acts {watch.timeout:g} s after the last request"
-    lost = f"{names_of(sessions)}: on loss of communication {it} {after}"
-    return f"{lost}: {does.rstrip('.')}."
+        return counted(count, *_GOES_ON, drives=names, reaction=watch.reaction.name)
+    does = sentence(watch.reaction.does) if watch.reaction else "its own reaction follows."
+    return counted(count, *_ACTS, drives=names, seconds=watch.timeout, reaction=does)
 
 
 def names_of(sessions: Sequence[DriveSession]) -> str:
     """Return the device addresses and the family name of drives of one family."""
-    word = "Device" if len(sessions) == 1 else "Devices"
     devices = ", ".join(str(session.device) for session in sessions)
-    return f"{word} {devices}, {sessions[0].profile.name}"
+    single, several = "Device {devices}, {family}", "Devices {devices}, {family}"
+    return counted(len(sessions), single, several, devices=devices, family=sessions[0].profile.name)
 
 
 async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str] = ()) -> Timeout:

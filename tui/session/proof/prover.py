@@ -14,6 +14,7 @@ from tui.drive.chart import ENABLED_KINDS, fault_code
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused, deciding_codes
 from tui.drive.profile.schema import CommunicationFault, Reaction
+from tui.drive.sentences import all_of
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
@@ -54,13 +55,17 @@ def hidden_at_rest(reaction: Reaction | None) -> str:
 def _nothing_runs(rules: CommunicationFault, reported: Mapping[str, Reading]) -> str:
     """Return why there is nothing to test, from the timeout reported for each port."""
     ports = (rules.timeout, *rules.other_timeouts)
-    silent = " and ".join(code for code in ports if code not in reported)
+    absent = [code for code in ports if code not in reported]
+    silent = all_of(absent) if absent else ""
     missing = f"{silent} cannot be read; perhaps this drive does not have it."
     if not reported:
         return f"Not tested: {missing} The reaction to a communication loss is unknown."
-    off = " and ".join(f"{code} is {reading.text}" for code, reading in reported.items())
+    off = all_of([f"{code} is {reading.text}" for code, reading in reported.items()])
     text = f"{off}. The drive does not react to a communication loss: a running motor continues."
     return f"{text} {missing}" if silent else text
+
+
+_CHANGED = "{code} is {value}; it was {before} when last read."
 
 
 @dataclass(slots=True)
@@ -193,15 +198,19 @@ class Prover:
         now = await self._read([code for code in ports if code and code in began])
         for code in now:
             if now[code].raw != began[code].raw:
+                value = f"{now[code].text} {now[code].unit}".rstrip()
                 raise OrderRefused(
-                    f"The test does not count: {code} changed during it, and is now"
-                    f" {f'{now[code].text} {now[code].unit}'.rstrip()}. Test again."
+                    f"The test does not count: {code} changed during it, and is now {value}."
+                    " Test again."
                 )
 
     def _changed(self, before: dict[str, Reading | None], readings: dict[str, Reading]) -> str:
         changed = [
-            f"{code} is {readings[code].text} {readings[code].unit}".rstrip()
-            + f"; it was {raw_text(self.session, held.parameter, held.raw)} when last read."
+            _CHANGED.format(
+                code=code,
+                value=f"{readings[code].text} {readings[code].unit}".rstrip(),
+                before=raw_text(self.session, held.parameter, held.raw),
+            )
             for code, held in before.items()
             if held is not None
             and held.raw is not None

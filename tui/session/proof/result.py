@@ -14,6 +14,22 @@ UNNAMED_FAULT = "a fault"
 """Fault whose code the drive does not report."""
 
 
+_NO_REACTION = (
+    "DID NOT REACT to {pause:.1f} s without a request. It is set to {timeout:g} s."
+    " A communication loss does not stop a running motor."
+)
+_NO_REACTION_SET = (
+    "DID NOT REACT to {pause:.1f} s without a request. It is set to {timeout:g} s, {reaction}."
+    " A communication loss does not stop a running motor."
+)
+_REACTED = {
+    "reacts": "Reacts {seconds:.1f} s after the last request.",
+    "trips": "Trips {seconds:.1f} s after the last request.",
+    "stops": "Stops {seconds:.1f} s after the last request.",
+    "slows down": "Slows down {seconds:.1f} s after the last request.",
+}
+
+
 @dataclass(frozen=True, slots=True)
 class ProofResult:
     """Result of one timeout test of one drive."""
@@ -54,19 +70,19 @@ class ProofResult:
         """The result in one or two sentences, for a person and the report."""
         middle = self.bracket.measured
         if middle is None:
-            return (
-                f"DID NOT REACT to {self.bracket.not_before:.1f} s without a request. It is set to"
-                f" {self.configured:g} s{self._reaction()}. A communication loss does not stop a"
-                " running motor."
+            text = _NO_REACTION_SET if self.reaction else _NO_REACTION
+            reaction = self.reaction.name if self.reaction else ""
+            return text.format(
+                pause=self.bracket.not_before, timeout=self.configured, reaction=reaction
             )
-        does = f", set to: {self.reaction.name.lower()}" if self.reaction else ""
-        what = f"{self.seen} {middle:.1f} s after the last request{does}"
-        fault = f", {self.fault.partition(',')[0]}" if self.fault else ""
-        verdict = "" if self.as_set else f" NOT AS SET: {self._why_not()}"
-        return f"{what[0].upper()}{what[1:]}{fault}.{verdict}"
-
-    def _reaction(self) -> str:
-        return f", {self.reaction.name.lower()}" if self.reaction else ""
+        texts = [_REACTED[self.seen or "reacts"].format(seconds=middle)]
+        if self.reaction:
+            texts.append(f"Set to: {self.reaction.name}.")
+        if self.fault:
+            texts.append(f"Fault: {self.fault.partition(',')[0]}.")
+        if not self.as_set:
+            texts.append(f"NOT AS SET: {self._why_not()}")
+        return " ".join(texts)
 
     def _why_not(self) -> str:
         if not self.bracket.holds(self.configured):

@@ -93,7 +93,7 @@ class MotorRun:
             self.observer.report("left-running", self._left_alone())
         elif stopped:
             raise MotorStopped(
-                f"Device {self.console.device} was stopped {stopped} before the end."
+                f"Device {self.console.device} was stopped by {stopped} before the end."
             )
 
     @property
@@ -139,7 +139,7 @@ class MotorRun:
     async def _follow(self) -> str:
         """Show the motor until the end; raises MotorStopped if it stops on its own.
 
-        Returns how it was stopped before the end, if it was not yet seen at rest.
+        Returns the source of a stop before the end, if it was not yet seen at rest.
         """
         begun = time.monotonic()
         seen, rest = 0, 0
@@ -167,7 +167,7 @@ class MotorRun:
         """Name the source of a stop since the run began; empty for none or one of this program."""
         work = self.console.session.work
         is_other = work.stops > self._stops and not self.is_stopped_here()
-        return f"by {work.stopped_by}" if is_other else ""
+        return work.stopped_by if is_other else ""
 
     def _at_rest(self, latest: Snapshot) -> bool:
         """Return True if it is seen not to run; a drive may stay in its quick stop at 0 Hz."""
@@ -190,17 +190,15 @@ class MotorRun:
                 f"Device {self.console.device} tripped: {fault.code}, {fault.name}. Check the"
                 " machine, remove the cause, then reset the fault."
             )
-        how = "by the drive or by another source"
+        text = "It was stopped by the drive or by another source."
         if by_others := self._stop_of_others():
-            how = by_others
+            text = f"It was stopped by {by_others}."
         elif lost := self.console.commander.given.changed_words():
-            how = f"by another program or master on the line: {lost}"
+            text = f"It was stopped by another program or master on the line: {lost}."
         elif latest.state.local:
-            how = "at its terminals or keypad"
+            text = "It was stopped at its terminals or keypad."
         state = latest.state.headline
-        return MotorStopped(
-            f"Device {self.console.device} no longer runs: {state}. It was stopped {how}."
-        )
+        return MotorStopped(f"Device {self.console.device} no longer runs: {state}. {text}")
 
     async def _bring_to_rest(self) -> None:
         """Stop the motor and wait for its standstill; on a lost line as soon as that is back.

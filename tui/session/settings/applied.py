@@ -93,16 +93,22 @@ class LinkChange:
     @property
     def text(self) -> str:
         """The effect, and the next step, for a person."""
-        when = "From now on" if self.at_once else "After its next reset"
-        if not self.device:
-            return (
-                f"{when}, the drive does not answer: {self.code} = {self.value} switches its"
-                " Modbus server off."
-            )
-        return (
-            f"{when}, the drive answers with {self.code} = {self.value}. Reach it as {self.line}"
-            f" -d {self.device}. If this line uses another port of the drive, nothing changes."
-        )
+        return _LINK_TEXTS[self.at_once, bool(self.device)].format(change=self)
+
+
+_LINK_TEXTS = {
+    (True, False): "From now on, the drive does not answer: {change.code} = {change.value} switches"
+    " its Modbus server off.",
+    (False, False): "After its next reset, the drive does not answer: {change.code} ="
+    " {change.value} switches its Modbus server off.",
+    (True, True): "From now on, the drive answers with {change.code} = {change.value}. Reach it as"
+    " {change.line} -d {change.device}. If this line uses another port of the drive, nothing"
+    " changes.",
+    (False, True): "After its next reset, the drive answers with {change.code} = {change.value}."
+    " Reach it as {change.line} -d {change.device}. If this line uses another port of the drive,"
+    " nothing changes.",
+}
+"""By whether it takes effect immediately, and whether the drive still has an address."""
 
 
 def link_change(profile: Profile, link: Link, device: int, edit: Edit) -> LinkChange | None:

@@ -162,8 +162,10 @@ class _Work:
         wanted = [edit.code, *([option.code] if option else [])]
         raws = await retrying.ask_raws(self._with_sources(wanted))
         if option is not None and raws.get(option.code) != option.factory:
-            text = f"{edit.code} was not written: {option.code} is not {option.factory}. So another"
-            text += f" option is fitted, for which {edit.code} has another meaning."
+            text = (
+                f"{edit.code} was not written: {option.code} is not {option.factory}. So another"
+                f" option is fitted, for which {edit.code} has another meaning."
+            )
             return Result(edit, EditOutcome.REFUSED, text, edit.old)
         held = raws.get(edit.code)
         if held is None:
@@ -253,9 +255,9 @@ class _Work:
         if isinstance(error, LineLost):
             text = f"{edit.code} was not written: {strip_outcome_note(error)}"
             return Result(edit, EditOutcome.NOT_SENT, text, held)
-        silent = "" if self._has_exceptions else " This family does not answer what it refuses."
-        why = f"{strip_outcome_note(error)}{silent} The drive is {self.retrying.headline}."
-        text = f"{edit.code} was not accepted: {why}"
+        silent = [] if self._has_exceptions else ["This family does not answer what it refuses."]
+        text = f"{edit.code} was not accepted: {strip_outcome_note(error)}"
+        text = " ".join([text, *silent, f"The drive is {self.retrying.headline}."])
         return Result(edit, EditOutcome.NOT_TAKEN, text, held)
 
     @staticmethod

@@ -16,6 +16,7 @@ from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import StateKind
+from tui.drive.sentences import first_of
 from tui.drive.settings.parameter_set import ParameterSet
 from tui.drive.settings.restore_plan import RestorePlan
 from tui.drive.settings.selection import FilterContext
@@ -238,8 +239,9 @@ class Editor:
         """Clear the lists of values that wait for a reset or for saving."""
         if self.waits_for_reset or self.unsaved:
             lost = ", ".join(sorted(self.unsaved))
-            gone = f" These settings were not saved, so check them: {lost}." if lost else ""
-            self._say(f"The drive was reset or switched off.{gone}", OutcomeKind.DONE)
+            unsaved = [f"These settings were not saved, so check them: {lost}."] if lost else []
+            text = " ".join(["The drive was reset or switched off.", *unsaved])
+            self._say(text, OutcomeKind.DONE)
         self.waits_for_reset = set()
         self.session.unsaved_settings.clear()
 
@@ -290,8 +292,7 @@ def _summary(applied: Applied, staged: Sequence[str]) -> str:
     done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
     parts = [f"Wrote {done}, all verified." if done else "Nothing written."]
     if left := list(dict.fromkeys((*failed, *staged))):
-        more = f" and {len(left) - LEFT_NAMED} more" if len(left) > LEFT_NAMED else ""
-        parts.append(f"{len(left)} still staged: {', '.join(left[:LEFT_NAMED])}{more}.")
+        parts.append(f"{len(left)} still staged: {first_of(left, LEFT_NAMED)}.")
     parts += [link.text for link in applied.links]
     if applied.after_reset:
         parts.append(f"Takes effect after a reset of the drive: {', '.join(applied.after_reset)}.")

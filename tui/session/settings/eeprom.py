@@ -7,6 +7,7 @@ from collections.abc import Collection, Mapping
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import MemoryOrder
+from tui.drive.sentences import first_of
 from tui.drive.settings.factory import factory_is_sure, factory_sources, not_factory
 from tui.drive.settings.memory_orders import MemoryRefused, factory_order, save_order
 from tui.drive.settings.writable import AT_REST, is_setting, line_setting
@@ -174,5 +175,5 @@ async def _report(session: DriveSession, retrying: RetryingReader) -> str:
     text = f"{profile.name}: the factory settings are restored in working memory."
     if not other:
         return f"{text} Checked {len(held)} settings; all have their factory value."
-    names = ", ".join(other[:SETTINGS_NAMED]) + (", ..." if len(other) > SETTINGS_NAMED else "")
+    names = first_of(other, SETTINGS_NAMED)
     return f"{text} {len(other)} of {len(held)} settings have another value: {names}."

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from tui.drive.errors import ValueRefused
+from tui.drive.sentences import counted
 from tui.drive.settings.edits import Edit, Edits
 from tui.drive.settings.restore_plan import RestorePlan
 
@@ -79,7 +80,7 @@ class Staging:
                 staged += 1
         if not olds:
             return "Nothing is staged: no old values are known."
-        return f"{staged} {'old value is' if staged == 1 else 'old values are'} staged."
+        return counted(staged, "1 old value is staged.", "{count} old values are staged.")
 
     def undo_all(self) -> None:
         """Unstage every edit."""

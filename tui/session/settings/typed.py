@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tui.drive.errors import ValueRefused
+from tui.drive.sentences import sentence
 from tui.drive.settings.edits import Edits
 from tui.drive.shown import scale_sources
 
@@ -38,5 +39,5 @@ async def stage_typed(
             raise ValueRefused(f"{code} can only be read.")
         edits = edits.stage(profile, code, value, retrying.raws, retrying.lacking)
     if not rounded and (losses := [edit.loss for edit in edits.requested if edit.loss]):
-        raise WouldRound(f"{'; '.join(losses)}.")
+        raise WouldRound(" ".join(sentence(loss) for loss in losses))
     return edits, retrying

@@ -131,8 +131,8 @@ class Writer:
 
     def _complete(self, entry: Entry, parameter: Parameter, check: int, back: int) -> None:
         taken = not (back ^ entry.new_raw) & check & 0xFFFFFFFF
-        came = f"{'Accepted' if taken else 'Not accepted'}: it" if check else "It"
-        answer = f"{came} holds {raw_text(self.session, parameter, back)}, read back later."
+        text = _HOLDS if not check else _HOLDS_ACCEPTED if taken else _HOLDS_NOT_ACCEPTED
+        answer = text.format(value=raw_text(self.session, parameter, back))
         self.journal.add(
             replace(
                 entry,
@@ -179,6 +179,9 @@ class Writer:
         return back
 
 
+_HOLDS = "It holds {value}, read back later."
+_HOLDS_ACCEPTED = "Accepted: it holds {value}, read back later."
+_HOLDS_NOT_ACCEPTED = "Not accepted: it holds {value}, read back later."
 CUT_SHORT = "canceled by a stop, may have taken effect"
 """Journal text of a write that was canceled before its reply."""
 
@@ -223,8 +226,10 @@ def device_refusal(
     """Explain an exception reply to a write: its meaning in this family, and the next step."""
     known = next((e for e in profile.data.exceptions if e.code == error.code), None)
     if known is None:
-        message = f"exception {error.code}, which no document of this family explains"
-        return f"The drive refused {parameter.code} with {message}. The drive is {headline}."
+        return (
+            f"The drive refused {parameter.code} with exception {error.code}, which no document of"
+            f" this family explains. The drive is {headline}."
+        )
     meaning = _sentence(known.meaning)
     next_step = _sentence(known.remedy)
     text = f"The drive refused {parameter.code} with exception {known.code}, {known.name}."

@@ -132,9 +132,8 @@ class Handover:
             return
         request = DriveRequest(device, program, self._clock.monotonic() + REQUEST_ANSWERED_WITHIN)
         self.requests = MappingProxyType({**self.requests, device: request})
-        who = f"{program.text[0].upper()}{program.text[1:]}"
-        self._say(device, f"{who} requests this drive. Press G to reply; without a reply it stays"
-                  " here while its motor runs.")  # fmt: skip
+        self._say(device, f"This drive is requested by {program.text}. Press G to reply; without a"
+                  " reply it stays here while its motor runs.")  # fmt: skip
         self._spawn(partial(self._expire, request), f"question about {device}")
 
     async def _expire(self, request: DriveRequest) -> None:
@@ -170,7 +169,7 @@ class Handover:
             else:
                 session.note_given()
         self._line.facts.answer(device, program.id, yes=yes)
-        self._say(device, f"{'Given to' if yes else 'Not given to'} {program.text}.")
+        self._say(device, f"Given to {program.text}." if yes else f"Not given to {program.text}.")
 
     async def _hand_over(
         self, session: DriveSession, starts: StartKeeper, program: Program
@@ -210,11 +209,11 @@ class Handover:
                 self._say(None, f"The line is shared with {text}.")
         for id, text in self._names.items():
             if id not in names:
-                self._say(None, f"{text[0].upper()}{text[1:]} has left the line.")
+                self._say(None, f"The line is no longer shared with {text}.")
                 self._void_questions_of(id)
         for device, id in facts.commanders.items():
             if id in names and self._commanders.get(device) != id:
-                self._say(device, f"{names[id][0].upper()}{names[id][1:]} commands this drive now.")
+                self._say(device, f"The commander of this drive is now {names[id]}.")
                 self._is_anothers(self._session_of(device))
         self._names, self._commanders = names, facts.commanders
 
@@ -233,6 +232,18 @@ class Handover:
         self._events.add("told", text, device)
 
 
+SHARED_BY_SEVERAL = "The line is shared with other programs."
+STOPPED_UNLESS = (
+    f"The motor is stopped on its ramp within {LONGEST_GRACE:g} s, unless the line is opened here"
+    " again."
+)
+STOPPED_UNLESS_TAKEN = (
+    f"The motor is stopped on its ramp within {LONGEST_GRACE:g} s, unless it is taken over there,"
+    " or the line is opened here again."
+)
+POLLED_BY_SEVERAL = "As long as other programs on the line poll this drive, the motor runs."
+
+
 def peer_effect_text(session: DriveSession, *, on_purpose: bool) -> str:
     """Describe the effect of other programs on a motor that this one leaves; empty if none.
 
@@ -242,16 +253,11 @@ def peer_effect_text(session: DriveSession, *, on_purpose: bool) -> str:
     others, starts = session.line.facts.others, session.starts
     if not others:
         return ""
-    text = others[0].text if len(others) == 1 else ""
+    alone = others[0].text if len(others) == 1 else ""
     if not on_purpose and starts is not None and starts.stopped_by_others(session.device):
-        who = f"{text[0].upper()}{text[1:]} is" if text else "Other programs are"
-        taken = "it is taken over there, or " if any(o.name == "panel" for o in others) else ""
-        return (
-            f"{who} on the line, too: the motor is stopped on its ramp within {LONGEST_GRACE:g} s,"
-            f" unless {taken}the line is opened here again."
-        )
+        shared = f"The line is shared with {alone}." if alone else SHARED_BY_SEVERAL
+        end = STOPPED_UNLESS_TAKEN if any(o.name == "panel" for o in others) else STOPPED_UNLESS
+        return f"{shared} {end}"
     if session.device not in session.line.pace.others:
         return ""
-    if text:
-        return f"{text[0].upper()}{text[1:]} polls this drive. As long as it does, the motor runs."
-    return "Other programs on the line poll this drive. As long as they do, the motor runs."
+    return f"As long as {alone} polls this drive, the motor runs." if alone else POLLED_BY_SEVERAL

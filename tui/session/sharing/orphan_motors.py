@@ -24,7 +24,7 @@ from tui.safety import LINE_BACK_WITHIN, LONGEST_GRACE, SILENT_CLIENT, TAKEN_OVE
 
 from ..clock import REAL_CLOCK, Clock
 from ..command.stop import Stopper
-from ..command.stop_report import Phase
+from ..command.stop_report import Phase, message_text
 from ..connect.line_key import line_key
 from ..drive import DriveSession
 from ..journal import Journal
@@ -260,7 +260,7 @@ class OrphanMotorGuard:
             if report.phase is Phase.STOPPED:
                 self._starts.end(session.line_text, device)
             if report.phase in (Phase.STOPPED, Phase.FAILED):
-                self._tell(device, f"{report.text[0].upper()}{report.text[1:].rstrip('.')}.")
+                self._tell(device, message_text(report.phase, report.text))
                 return
 
     def _tell(self, device: int, text: str) -> None:

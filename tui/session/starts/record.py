@@ -69,6 +69,23 @@ class StartRecord:
             return None
 
 
+RUNNING_SINCE = {
+    (True, True): "Running since {since}.",
+    (True, False): "Running.",
+    (False, True): "May be running since {since}.",
+    (False, False): "May be running.",
+}
+"""By whether it is seen to run, and whether the time of its start is known."""
+STARTED_BY = {
+    (False, False): "Started by {name}, process {pid}, which has exited.",
+    (False, True): "Started by {name}, process {pid}, which does not answer on this line.",
+    (True, False): "Left running on purpose by {name}, process {pid}, which has exited.",
+    (True, True): "Left running on purpose by {name}, process {pid}, which does not answer on this"
+    " line.",
+}
+"""By whether it was left running on purpose, and whether its program lives."""
+
+
 def offer(
     record: StartRecord,
     identity: DriveIdentity | None,
@@ -86,13 +103,9 @@ def offer(
     if runs is False or (identity is not None and not _same(record, identity)):
         return ""
     since = _since(record.begun, now or datetime.now().astimezone())
-    does = "runs" if runs else "may run"
-    how = "left running on purpose" if record.left_running else "started"
-    gone = "does not answer on this line" if lives else "has exited"
-    return (
-        f"{does}{since}, {how} by {record.program}, process {record.pid}, which {gone};"
-        " no program commands it"
-    )
+    state = RUNNING_SINCE[bool(runs), bool(since)].format(since=since)
+    program = STARTED_BY[record.left_running, lives].format(name=record.program, pid=record.pid)
+    return f"{state} {program} No program commands it."
 
 
 def _same(record: StartRecord, identity: DriveIdentity) -> bool:
@@ -112,7 +125,7 @@ def _since(then: datetime | None, now: datetime) -> str:
     if then is None:
         return ""
     then = then.astimezone(now.tzinfo)
-    return f" since {then:%H:%M}" if then.date() == now.date() else f" since {then:%Y-%m-%d %H:%M}"
+    return f"{then:%H:%M}" if then.date() == now.date() else f"{then:%Y-%m-%d %H:%M}"
 
 
 OVERTAKEN = "a stop came first"

@@ -10,6 +10,7 @@ from decimal import Decimal
 
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
+from tui.drive.sentences import all_of
 from tui.drive.taught_profile import reference_of, why_no_reference, why_not_taught, with_taught
 from tui.drive.teaching import DisplayLook, Lesson, TaughtScale, learn, parse_display, taught_by
 
@@ -167,14 +168,13 @@ class Teacher:
 def reference_asks(family: Profile, code: str) -> str:
     """Return the warning that a person must confirm before a parameter takes the reference."""
     way = reference_of(family, code)
-    chooses = ""
+    texts = [f"No available manual says that {code} takes this drive's reference."]
     if way is not None and way.bits:
         word = family.quantity("command_word")
-        bits = " and ".join(f"bit {bit}" for bit in range(16) if way.bits >> bit & 1)
+        bits = all_of([f"bit {bit}" for bit in range(16) if way.bits >> bit & 1])
         word_name = word.code if word else "the command word"
-        chooses = f" Each run command then sets {bits} of {word_name}."
-    note = f" {way.note}" if way is not None and way.note else ""
-    return (
-        f"No available manual says that {code} takes this drive's reference.{chooses}{note} First"
-        " try it where the motor may turn at any speed, and be ready to stop it."
-    )
+        texts.append(f"Each run command then sets {bits} of {word_name}.")
+    if way is not None and way.note:
+        texts.append(way.note)
+    texts.append("First try it where the motor may turn at any speed, and be ready to stop it.")
+    return " ".join(texts)

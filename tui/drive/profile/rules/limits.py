@@ -32,7 +32,7 @@ def circles(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if way := _circle(follows, parameter.code):
             yield (
                 ("parameters", index, "scale_by"),
-                f"parameter {parameter.code}: its scale depends on itself: {' by '.join(way)}.",
+                f"parameter {parameter.code}: its scale depends on itself: {' -> '.join(way)}.",
             )
 
 

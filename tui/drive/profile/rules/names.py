@@ -6,6 +6,8 @@ import difflib
 import re
 from collections.abc import Iterator
 
+from tui.drive.sentences import any_of
+
 from ..schema import Chart, Parameter, ProfileData
 from ..toml_lines import TomlPath
 
@@ -27,8 +29,8 @@ def references(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     for place, code in named_parameters(data):
         if code and code not in known:
             near = difflib.get_close_matches(code, codes, n=3, cutoff=0.6)
-            hint = f" Did you mean {' or '.join(near)}?" if near else ""
-            yield place, f"{place[0]}: there is no parameter {code!r}.{hint}"
+            text = f"{place[0]}: there is no parameter {code!r}."
+            yield place, f"{text} Did you mean {any_of(near)}?" if near else text
 
 
 def named_parameters(data: ProfileData) -> Iterator[NamedPlace]:

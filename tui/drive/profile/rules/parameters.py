@@ -41,7 +41,7 @@ def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         rows = getattr(data, table)
         yield from _twice(
             (((table, n, "id"), row.id) for n, row in enumerate(rows)),
-            "id {} occurs twice in " + table + ".",
+            f"id {{}} occurs twice in {table}.",
         )
     yield from _twice(
         ((("groups", n, "name"), g.name) for n, g in enumerate(data.groups)),

@@ -1,0 +1,33 @@
+"""Sentences with a count: one for a single thing, one for several or none."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+def counted(count: int, single: str, several: str, **values: object) -> str:
+    """Return the sentence that fits a count, with `{count}` and other placeholders filled in."""
+    return (single if count == 1 else several).format(count=count, **values)
+
+
+def first_of(items: Sequence[str], most: int, separator: str = ", ") -> str:
+    """Return a list of names, of which `most` are shown, with the number of the others."""
+    shown, more = separator.join(items[:most]), len(items) - most
+    return f"{shown} and {more} more" if more > 0 else shown
+
+
+def sentence(text: str) -> str:
+    """Return a text of a profile or a file with exactly one full stop at its end."""
+    return f"{text.rstrip('.')}."
+
+
+def all_of(names: Sequence[str]) -> str:
+    """Return names as one part of a sentence, with `and` before the last."""
+    *first, last = names or ("none",)
+    return f"{', '.join(first)} and {last}" if first else last
+
+
+def any_of(names: Sequence[str]) -> str:
+    """Return names as one part of a sentence, with `or` before the last."""
+    *first, last = names or ("none",)
+    return f"{', '.join(first)} or {last}" if first else last
