@@ -17,6 +17,7 @@ from typing import NamedTuple
 import pytest
 import tomli
 
+from .glue import all_glued, glued
 from .sources import ROOT, modules, tree_of
 
 TESTS = ROOT / "tests"
@@ -146,6 +147,12 @@ EXCEPTIONS: dict[tuple[int, str, str], str] = {
     (21, "does", "tui/drive/profile/json_schema.py"): "a key of profiles",
 }
 """By check, whole text and place: the reason why a hit stays. The texts are public."""
+
+
+GLUED = {
+    ("tui/drive/sentences.py", "{text.rstrip('.')}"): "the one function that ends sentences",
+}
+"""By module and source of a glued text: the reason why it stays."""
 
 
 def _docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
@@ -318,6 +325,58 @@ def test_check_finds_its_example(number: int) -> None:
     bad = Text(check.kinds[0], "x", 1, check.bad)
     assert list(hits(number, [bad]))
     assert not list(hits(number, [bad._replace(text="Stop the motor.")]))
+
+
+def test_no_text_is_glued_from_pieces() -> None:
+    found = {
+        f"{item.path}:{item.line}: {item.form}: {item.text}"
+        for item in all_glued()
+        if (item.path, item.text) not in GLUED
+    }
+    assert not found
+
+
+def test_every_exception_of_glue_is_needed() -> None:
+    assert {(item.path, item.text) for item in all_glued()} >= GLUED.keys()
+
+
+@pytest.mark.parametrize(
+    ("form", "source"),
+    [
+        ("capital", "text = f'{name[0].upper()}{name[1:]} stops.'"),
+        ("capital", "text = name[:1].lower()"),
+        ("switch", """text = f'{count} drive{"s" if count > 1 else ""} found'"""),
+        ("switch", """text = f'It {"runs" if runs else f"may run for {time}"}.'"""),
+        ("plus", "text = name + ' has left the line.'"),
+        ("plus", "text += f' Retrying in {seconds} s.'"),
+        ("plus", "text = '; '.join(texts) + '.'"),
+        ("full stop", """text = f'{meaning.rstrip(".")}.'"""),
+        ("list", "text = ' and '.join(names)"),
+        ("fragment", "early = '' if done else ', not all of which were polled'"),
+        ("fragment", "more = f' and {count} more'"),
+        ("fragment", "after = ' (until the next reset)'"),
+    ],
+)
+def test_glue_is_found(form: str, source: str) -> None:
+    assert form in {item.form for item in glued(ast.parse(source), "x.py")}
+
+
+@pytest.mark.parametrize(
+    "source",
+    [
+        "text = f'{name} has left the line.'",
+        "text = one if count == 1 else many",
+        "text = ', '.join(names)",
+        "text = ' '.join([text, 'Press s to scan again.'])",
+        "text = f'{text} Press s to scan again.'",
+        "key = ' stop'",
+        "path = name + '.toml'",
+        "head = text.removesuffix(' of the drive')",
+        "'''Document, with text.'''",
+    ],
+)
+def test_whole_sentence_is_not_glue(source: str) -> None:
+    assert not list(glued(ast.parse(source), "x.py"))
 
 
 def test_texts_of_a_module_are_sorted_by_kind() -> None:
