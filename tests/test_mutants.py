@@ -199,7 +199,7 @@ def test_lines_of_a_record_follow_the_source() -> None:
     assert same_lines(["a", "b"], ["b"]) == [(1, 2)]
 
 
-def test_a_test_that_was_renamed_is_found_by_its_body() -> None:
+def test_test_that_was_renamed_is_found_by_its_body() -> None:
     before = ["def test_a() -> None:", "    a", "def test_b() -> None:", "    b"]
     new = ["def test_new() -> None:", "    new"]
     assert new_names(before, [*new, "async def test_c() -> None:", *before[1:]]) == {

@@ -50,7 +50,7 @@ async def test_line_connects_when_the_port_appears(tmp_path: Path, open_line: Op
         assert (await line.read(1, 5)).words == (5,)
 
 
-def test_a_lost_line_is_retried_soon_then_less_often(tmp_path: Path, open_line: OpenLine) -> None:
+def test_lost_line_is_retried_soon_then_less_often(tmp_path: Path, open_line: OpenLine) -> None:
     timing = replace(QUICK, reconnect_first=0.01, reconnect_longest=0.05)
     line = open_line(str(tmp_path / "port"), timing, wait=None)
     pauses: list[float] = []

@@ -418,9 +418,7 @@ class _Answers:
 
 
 @pytest.mark.parametrize(("code", "answered"), [(2, True), (10, False), (11, False)])
-async def test_gateways_report_of_a_silent_drive_is_no_reply_of_the_drive(
-    code: int, answered: bool
-) -> None:
+async def test_gateway_exception_is_not_a_reply_of_the_drive(code: int, answered: bool) -> None:
     line = _Line(gateway=True)
     job = Job(Read(1, 100, 1), Priority.POLL, NO_ECHO)
     master = cast(Master, _Answers(ResultKind.EXCEPTION, code))

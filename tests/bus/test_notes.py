@@ -29,7 +29,7 @@ def test_note_is_kept_for_ten_minutes() -> None:
     assert NOTES_KEPT == 600
 
 
-def test_the_same_note_is_kept_once() -> None:
+def test_same_note_is_kept_once() -> None:
     bench = Bench()
     for _ in range(3):
         bench.notes.keep(LineNote(1, "a", b"same"))

@@ -33,7 +33,7 @@ class Meeting:
         assert not self._thread.is_alive()
 
 
-def test_two_stops_at_once_count_as_two() -> None:
+def test_two_simultaneous_stops_count_as_two() -> None:
     class Met(StopCounts):
         def of(self, program: str, devices: Iterable[int]) -> tuple[int, ...]:
             found = super().of(program, devices)

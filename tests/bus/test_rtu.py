@@ -38,7 +38,7 @@ def test_cut_or_damaged_reply_is_not_found(cut: int, bit: int) -> None:
     assert find_reply(damaged, 1, READ.expectation()) is None
 
 
-def test_the_reply_of_another_device_is_not_found() -> None:
+def test_reply_of_another_device_is_not_found() -> None:
     """The same to the last word, and its checksum is right."""
     theirs = frame(7, honest_pdu(READ.pdu()))
     assert find_reply(theirs, 1, READ.expectation()) is None

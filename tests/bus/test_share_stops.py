@@ -91,7 +91,7 @@ async def test_stop_discards_pending_work_for_its_drive_only(
             await program.write(1, 1, [RUN])
 
 
-async def test_a_stop_is_counted_by_all_programs_before_their_listeners_hear_of_it(
+async def test_stop_is_counted_by_all_programs_before_their_listeners_hear_of_it(
     share: Share,
 ) -> None:
     """A command that a listener hands over then has been typed after the stop."""

@@ -28,7 +28,7 @@ def test_row_keeps_its_columns(cells: tuple[str, ...], text: str) -> None:
     assert row_text(COLUMNS, cells) == text
 
 
-def test_empty_cell_without_a_width_takes_no_place() -> None:
+def test_empty_cell_without_a_width_uses_no_space() -> None:
     assert row_text((Column(), Column(), Column()), ("a", "", "c")) == "a  c"
 
 

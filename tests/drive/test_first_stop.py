@@ -66,7 +66,7 @@ def test_named_families_then_silent_ones_come_first() -> None:
     assert [place.address for place in named] == [CMD, LEROY, 0xFA00]
 
 
-def test_command_register_of_one_family_is_no_setting_of_another() -> None:
+def test_command_register_of_one_family_is_not_a_setting_of_another() -> None:
     """A word for one kind must not change a setting of another."""
     for place in PLACES.values():
         stopped = {family.id for family in place.families}

@@ -137,7 +137,7 @@ def test_missing_file_is_reported(tmp_path: Path) -> None:
         library.load_file(tmp_path / "none.toml")
 
 
-def test_an_unknown_profile_names_the_known_ones() -> None:
+def test_unknown_profile_names_the_known_ones() -> None:
     with pytest.raises(UnknownProfile, match="atv71"):
         library.load("atv99")
 
@@ -257,7 +257,7 @@ def test_shared_rows_are_stored_once(family: str) -> None:
 SHARING = {"atv31": 231, "atv312": 231, "powerdrive": 68, "proxidrive": 68, "varmeca": 68}
 
 
-def test_the_schema_describes_every_field() -> None:
+def test_schema_describes_every_field() -> None:
     schema = json.loads(CliRunner().invoke(main, ["profiles", "--schema"]).output)
     bare = [
         f"{table}.{field}"

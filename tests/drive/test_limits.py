@@ -31,7 +31,7 @@ HELD = {"TFR": 600, "HSP": 500, "LSP": 0, "INR": 1, "ACC": 30, "BFR": 0, "TTO": 
         ("TTO", "0.1 .. 30.0 s"),
     ],
 )
-def test_a_limit_that_another_parameter_sets_is_named(code: str, text: str) -> None:
+def test_limit_that_another_parameter_sets_is_named(code: str, text: str) -> None:
     limits = limits_in_force(ATV71, ATV71[code], HELD)
     assert limits is not None
     assert limits.text == text

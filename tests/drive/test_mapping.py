@@ -166,14 +166,14 @@ def test_unknown_address_is_a_problem_of_its_slot() -> None:
     assert "not one of its 11 choices" in wrong.text
 
 
-def test_a_write_block_whose_first_slot_is_unused_is_refused_by_the_drive() -> None:
+def test_write_block_whose_first_slot_is_unused_is_refused_by_the_drive() -> None:
     plan = empty(block("atv21", "write")).with_raw(1, 3)
     assert any("exception 4" in p.text and p.refuses for p in assignment_problems(ATV21, plan))
     hole = made("atv21", "read", ["FD01", "none", "FE03"])
     assert [p.refuses for p in assignment_problems(ATV21, hole)] == [False]
 
 
-def test_a_parameter_that_this_drive_lacks_is_reported() -> None:
+def test_parameter_that_this_drive_lacks_is_reported() -> None:
     (wrong,) = assignment_problems(ATV71, made("atv71", "read", ["LCR"]), {"LCR"})
     assert "reports that it has no LCR" in wrong.text
 
@@ -258,7 +258,7 @@ def test_assignment_never_makes_the_cheapest_plan_slower(raws: tuple[int, ...]) 
 # What it costs
 
 
-def test_the_read_block_saves_three_requests_of_five() -> None:
+def test_read_block_saves_three_requests_of_five() -> None:
     codes = ["FD01", "FD00", "FE03", "FE05", "FE90"]
     plan = made("atv21", "read", codes)
     found = saving(ATV21, codes, TIMING, {}, plan.slots)

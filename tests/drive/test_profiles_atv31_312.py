@@ -139,7 +139,7 @@ def test_inputs_of_a_large_drive_can_be_typed(profile: Profile, code: str, typed
     assert encode(parameter, typed, profile.names(parameter), scale).rounded is False
 
 
-def test_the_access_level_warns(profile: Profile) -> None:
+def test_access_level_warns(profile: Profile) -> None:
     assert "starts the motor immediately" in profile["LAC"].note
 
 

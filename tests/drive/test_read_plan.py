@@ -158,7 +158,7 @@ def test_scanner_read_does_not_include_an_unused_slot() -> None:
     assert spans(plan) == [(500, 1), (1200, 1)]
 
 
-def test_a_block_with_a_free_first_slot_is_not_used() -> None:
+def test_block_with_a_free_first_slot_is_not_used() -> None:
     profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
     plan = plan_reads(profile, codes([900]), TIMING, slots={"P2165": 0, "P2166": 2})
     assert spans(plan) == [(900, 1)]
@@ -188,7 +188,7 @@ def test_changeable_slots_are_read_after_their_block() -> None:
     assert plan.microseconds == round(plan.seconds * 1e6)
 
 
-def test_a_scanner_that_saves_no_time_is_not_used() -> None:
+def test_scanner_that_saves_no_time_is_not_used() -> None:
     profile = profile_of([500, 900, 2165, 2166, 2167], blocks=[SCANNER])
     plan = plan_reads(profile, codes([500, 900]), TIMING, slots={"P2165": 500, "P2166": 900})
     # two reads of one word and two reads of two words: the drive is asked directly

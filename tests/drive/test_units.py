@@ -30,12 +30,12 @@ TENTH = Decimal("0.1")
         ("ItH", "5000mA", 50),
     ],
 )
-def test_a_unit_of_the_same_kind_is_understood(code: str, typed: str, raw: int) -> None:
+def test_unit_of_the_same_kind_is_understood(code: str, typed: str, raw: int) -> None:
     assert encode(ATV312[code], typed, {}, TENTH).raw == raw
 
 
 @pytest.mark.parametrize("typed", ["5Hz", "5 %", "ms", "5 parsecs", "5 m", "0.05 MHz", "3.5s s"])
-def test_a_unit_of_another_kind_is_refused(typed: str) -> None:
+def test_unit_of_another_kind_is_refused(typed: str) -> None:
     with pytest.raises(ValueRefused, match="is not a number in s"):
         encode(ATV312["ACC"], typed, {}, TENTH)
 

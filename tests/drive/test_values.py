@@ -127,7 +127,7 @@ def test_number_has_the_digits_of_its_scale(scale: str, raw: int, text: str) -> 
         ("0.0003", True, True),
     ],
 )
-def test_a_long_scale_rounds_only_numbers_between_its_counts(
+def test_long_scale_rounds_only_numbers_between_its_counts(
     typed: str, rounded: bool, lossy: bool
 ) -> None:
     p = parameter(unit="Hz", scale="0.0012207031250")
@@ -164,7 +164,7 @@ def test_rounding_is_half_away_from_zero_and_reported(typed: str, raw: int, roun
     assert (found.raw, found.rounded) == (raw, rounded)
 
 
-def test_a_negative_half_is_rounded_away_from_zero() -> None:
+def test_negative_half_is_rounded_away_from_zero() -> None:
     p = parameter(unit="Hz", scale="0.1", type="int16")
     assert encode(p, "-0.25", {}, Decimal("0.1")).raw == -3
 
@@ -218,7 +218,7 @@ def test_former_names_of_values_are_still_read(family: str, code: str, former: s
     assert names[encode(profile[code], former, names, Decimal(1)).raw] == present[former]
 
 
-def test_a_number_with_a_special_name_is_still_a_number() -> None:
+def test_number_with_a_special_name_is_still_a_number() -> None:
     p = parameter(values={"0": "Off"}, unit="s", min=0, max=100)
     assert decode(p, 0, {0: "Off"}, Decimal(1)).text == "Off"
     assert decode(p, 3, {0: "Off"}, Decimal(1)).display == "3 s"
@@ -242,7 +242,7 @@ def test_reserved_bits_must_be_zero() -> None:
     assert [bit.name for bit in set_bits(p.bits, 9)] == ["run"]
 
 
-def test_an_unknown_scale_is_shown_raw_and_never_written() -> None:
+def test_unknown_scale_is_shown_raw_and_never_written() -> None:
     p = parameter(unit="s", scale_by={"parameter": "Inr", "scales": {"1": "0.1"}})
     value = decode(p, 30, {}, None)
     assert value.display == "30 raw"

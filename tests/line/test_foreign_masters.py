@@ -89,7 +89,7 @@ def test_write_by_mbpoll_is_read_by_both(reached: Reached) -> None:
     assert ours(reached.line, "ACC", "ETA", "RFR") == {"ACC": 61, "ETA": 0x0637, "RFR": 425}
 
 
-def test_mbpoll_writes_two_neighbors_at_once(reached: Reached) -> None:
+def test_mbpoll_writes_two_neighbors_in_one_request(reached: Reached) -> None:
     assert reached.mbpoll.run(ACCELERATION, "62", "63").returncode == 0
     assert ours(reached.line, "ACC", "DEC") == {"ACC": 62, "DEC": 63}
 

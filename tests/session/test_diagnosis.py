@@ -282,7 +282,7 @@ def test_latency_is_reported_if_set_and_measured(
         assert "ttyUSB0/latency_timer" in found.steps[0]
 
 
-async def test_the_latency_is_measured_on_the_line(line: OpenedLine) -> None:
+async def test_latency_is_measured_on_the_line(line: OpenedLine) -> None:
     with PtyPeer(lambda request, _: [0.03, reply(request)]) as peer:
         found = diagnosed(await sight_of_drive(line(peer.path), 2, PROFILE))
     assert found.sight.turnaround is not None

@@ -58,7 +58,7 @@ async def test_first_stop_stops_each_family_before_identification(
     assert others <= ({8501} if named == "atv312" else set())
 
 
-async def test_a_ramp_stop_of_the_family_named_does_not_start_another(
+async def test_ramp_stop_of_the_family_named_does_not_start_another(
     start: Start, journal: Journal
 ) -> None:
     """In the I/O profile 16#0007, the stop of an Altivar 312, runs an Altivar 71."""

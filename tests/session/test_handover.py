@@ -286,7 +286,7 @@ async def test_motor_given_away_is_not_stopped_at_the_exit(
     assert not bench.session.commanded
 
 
-async def test_motor_nobody_took_is_stopped_at_the_exit(bench: Bench) -> None:
+async def test_motor_not_taken_over_is_stopped_at_the_exit(bench: Bench) -> None:
     await given_while_it_runs(bench)
     await asyncio.sleep(0.05)
     bench.clock.advance(TAKEN_WITHIN + TAKEN_LOOK)

@@ -199,7 +199,7 @@ def test_turn_of_another_program_is_awaited_for_half_a_second(
 
 
 @posix
-def test_file_system_without_locks_keeps_nobody_waiting(
+def test_file_system_without_locks_blocks_no_program(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(*_: object) -> None:

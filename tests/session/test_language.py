@@ -109,7 +109,7 @@ def test_registers_of_functions_3_and_4_are_read_separately() -> None:
     assert requested == [(3, 10, 2), (4, 10, 2)]
 
 
-async def test_an_input_register_is_read_by_function_4() -> None:
+async def test_input_register_is_read_by_function_4() -> None:
     line = OneDrive({10: 0xFFFE, 11: 0xFFFE})
     session = armed(line, FIELDS)
     readings = await Reader(session).read(["AMPS", "WHOLE"])

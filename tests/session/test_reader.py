@@ -72,7 +72,7 @@ async def test_word_that_may_mean_no_value_is_read_alone() -> None:
     }
 
 
-async def test_a_ramp_is_read_with_its_increment() -> None:
+async def test_ramp_is_read_with_its_increment() -> None:
     profile = profile_of(
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR),
         parameter("INR", 9020, values={"0": "0.01 s", "1": "0.1 s", "2": "1 s"}),
@@ -84,7 +84,7 @@ async def test_a_ramp_is_read_with_its_increment() -> None:
     assert (await reader.read(["ACC"]))["ACC"].text == "30"
 
 
-async def test_a_ramp_without_its_increment_is_shown_raw() -> None:
+async def test_ramp_without_its_increment_is_shown_raw() -> None:
     profile = profile_of(
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR), parameter("INR", 9020)
     )

@@ -73,7 +73,7 @@ def test_value_beyond_another_parameter_is_clamped_on_71_and_refused_on_21() -> 
     assert Bench("atv21").write("FA01", 8001) == "8603"
 
 
-def test_an_unknown_address_refuses_the_whole_request() -> None:
+def test_unknown_address_refuses_the_whole_request() -> None:
     bench = Bench("atv71")
     three = struct.pack(">BHHBHHH", 16, 9001, 3, 6, 11, 22, 33).hex()
     assert bench.ask(three) == "9002"
@@ -99,7 +99,7 @@ def test_stopped_only_words_refuse_while_the_motor_runs() -> None:
     bench.taken("SFR", 50)
 
 
-def test_a_busy_drive_refuses_writes_and_answers_reads() -> None:
+def test_busy_drive_refuses_writes_and_answers_reads() -> None:
     bench = Bench("atv21")
     bench.drive.busy = True
     assert bench.write("FA01", 100) == "8604"
@@ -143,7 +143,7 @@ def test_nothing_can_be_written_during_an_eeprom_save() -> None:
     bench.taken("ACC", 10)
 
 
-def test_a_running_drive_does_not_save() -> None:
+def test_running_drive_does_not_save() -> None:
     bench = Bench("atv71", run_hz=20.0)
     bench.run(0.1)
     bench.taken("ACC", 44)

@@ -156,7 +156,7 @@ def test_separate_channels_take_the_command_from_one_and_the_reference_from_anot
 
 
 @pytest.mark.parametrize("family", ALL)
-def test_a_bit_of_the_command_word_switches_the_reference(family: str) -> None:
+def test_bit_of_the_command_word_switches_the_reference(family: str) -> None:
     """rFC = C114: bit 14 of the word that Modbus wrote."""
     rig = Exchange(family, {"CHCF": 2, "FR1": 164, "CD1": 10, "FR2": 1, "RFC": 190})
     rig.play(f"""

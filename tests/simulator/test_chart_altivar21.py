@@ -75,7 +75,7 @@ def test_preset_speeds_override_the_reference() -> None:
     assert bench.word("FD00") == 1000, "preset 2 of a profile without preset speeds"
 
 
-def test_the_emergency_stop_works_without_priority_and_trips() -> None:
+def test_emergency_stop_works_without_priority_and_trips() -> None:
     bench = Bench("atv21", UNWATCHED, run_hz=30.0)
     bench.run(7)
     bench.taken("FA00", 0x1000)
@@ -85,7 +85,7 @@ def test_the_emergency_stop_works_without_priority_and_trips() -> None:
     assert bench.word("FD01") & 0x4003 == 3
 
 
-def test_a_reset_needs_the_command_and_an_edge() -> None:
+def test_reset_needs_the_command_and_an_edge() -> None:
     bench = Bench("atv21", UNWATCHED)
     bench.drive.provoke("OC1")
     assert bench.word("FC90") == 1

@@ -55,7 +55,7 @@ def test_reverse_shows_in_bit_15_once_the_motor_turns_that_way() -> None:
     assert bench.word("RFRD") > 0x8000
 
 
-def test_a_negative_reference_reverses_and_bit_11_turns_it_back() -> None:
+def test_negative_reference_reverses_and_bit_11_turns_it_back() -> None:
     bench = started()
     bench.taken("LFR", -300)
     bench.run(6)
@@ -275,7 +275,7 @@ def test_fault_reset_needs_an_edge_of_bit_7() -> None:
     assert bench.word("ETA") & 0x6F == 0x40
 
 
-def test_a_fault_whose_cause_is_still_there_cannot_be_reset() -> None:
+def test_fault_whose_cause_is_still_there_cannot_be_reset() -> None:
     bench = Bench("atv71")
     bench.drive.provoke("ObF", persists=True)
     assert not bench.word("ETI") & 4

@@ -44,7 +44,7 @@ def test_example_pump_runs_trips_on_timeout_and_is_reset() -> None:
     """)
 
 
-def test_a_closed_run_input_starts_the_pump_after_the_reset() -> None:
+def test_closed_run_input_starts_the_pump_after_the_reset() -> None:
     Exchange(pump()).play("""
         @ AI1=4V
         @ RUN=1

@@ -40,7 +40,7 @@ def everything(talk: RtuConversation, until: float) -> list[tuple[float, bytes]]
 # Without real time
 
 
-def test_a_request_is_answered_as_soon_as_it_is_complete() -> None:
+def test_request_is_answered_as_soon_as_it_is_complete() -> None:
     talk = conversation()
     talk.feed(REQUEST[:5], 1.0)
     assert talk.poll(1.0) == b""

@@ -98,7 +98,7 @@ def test_leroy_somer_drive_never_answers_at_a_group_address() -> None:
 # Servers
 
 
-def test_an_atv71_has_three_servers_each_at_its_address() -> None:
+def test_atv71_has_three_servers_each_at_its_address() -> None:
     sets = {"AMOA": 54, "AMOC": 104, "%MW20": 0x54, "IPC1": 139}
     on = line(DriveSpec("atv71", 2, sets=sets))
     assert requested(on, 2, read(9001)) is not None
@@ -110,7 +110,7 @@ def test_an_atv71_has_three_servers_each_at_its_address() -> None:
     assert requested(on, 54, read(20)) == bytes.fromhex("3603020007")
 
 
-def test_a_server_whose_address_is_0_is_off() -> None:
+def test_server_whose_address_is_0_is_off() -> None:
     on = line(DriveSpec("atv71", 2))
     assert requested(on, 54, read(20)) is None
 
@@ -147,7 +147,7 @@ def test_fragments_are_ignored(garbage: str) -> None:
     assert line(*TWO).receive(bytes.fromhex(garbage)) is None
 
 
-def test_a_drive_without_supply_is_silent() -> None:
+def test_drive_without_supply_is_silent() -> None:
     on = line(*TWO)
     on.drive(2).power_off()
     assert requested(on, 2, read(9001)) is None

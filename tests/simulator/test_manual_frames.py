@@ -47,7 +47,7 @@ def test_drive_answers_as_printed_in_its_manual(example: Example) -> None:
 @pytest.mark.parametrize(
     "example", [e for e in EXAMPLES if FRAMES[e.request].printed], ids=lambda e: e.name
 )
-def test_a_misprinted_checksum_is_not_answered(example: Example) -> None:
+def test_misprinted_checksum_is_not_answered(example: Example) -> None:
     printed = FRAMES[example.request].printed
     assert printed is not None
     assert simulated(example).line.receive(printed) is None

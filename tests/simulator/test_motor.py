@@ -120,7 +120,7 @@ def test_energy_and_hours_add_up() -> None:
     assert idle.on_hours == pytest.approx(0.2, rel=0.01)
 
 
-def test_a_long_step_equals_many_short_ones() -> None:
+def test_long_step_equals_many_short_ones() -> None:
     once = step(MotorState(), RATING, GO, 0.7, 230.0, 2.5)
     assert once.frequency == pytest.approx(25)
     assert once.motor_thermal == pytest.approx(run(MotorState(), GO, 2.5).motor_thermal)

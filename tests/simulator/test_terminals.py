@@ -13,7 +13,7 @@ AT_THE_TERMINALS = {"FR1": 1}
 
 
 @pytest.mark.parametrize("family", ["atv31", "atv312", "atv71"])
-def test_a_closed_run_input_starts_the_motor_after_a_reset(family: str) -> None:
+def test_closed_run_input_starts_the_motor_after_a_reset(family: str) -> None:
     """2 wires, TCT = level, RSF = LI4; CMD bit 7 does nothing while the terminals command."""
     rig = Exchange(family, {**AT_THE_TERMINALS, "RSF": 132, "TCT": 0})
     rig.play("""
@@ -130,7 +130,7 @@ def test_cmi_bit_13_blocks_a_start_but_not_a_running_motor(
     """)
 
 
-def test_an_input_may_be_the_external_fault() -> None:
+def test_input_may_be_the_external_fault() -> None:
     rig = Exchange("atv71", {"ETF": 131})
     rig.play("@ LI3=1")
     assert rig.drive.fault is not None
@@ -245,7 +245,7 @@ def test_res_resets_a_fault_and_inputs_are_in_fd06() -> None:
 # Leroy-Somer
 
 
-def test_a_closed_run_input_starts_a_leroy_somer_drive_after_a_reset() -> None:
+def test_closed_run_input_starts_a_leroy_somer_drive_after_a_reset() -> None:
     rig = Exchange("powerdrive")
     rig.play("""
         @ RUN=1

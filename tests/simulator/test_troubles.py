@@ -74,7 +74,7 @@ def test_each_second_request_is_lost() -> None:
     assert found == [STATUS, None, STATUS, None]
 
 
-def test_a_lost_request_does_not_reach_the_drive() -> None:
+def test_lost_request_does_not_reach_the_drive() -> None:
     rates, habits = troubles_of({"lost-every": 2})
     with Simulation([DriveSpec("atv71", 2)], faults=rates, habits=habits) as simulation:
         place = simulation.serve_tcp()
@@ -85,7 +85,7 @@ def test_a_lost_request_does_not_reach_the_drive() -> None:
 
 
 @pytest.mark.parametrize("code", [10, 11])
-def test_a_gateway_replies_with_its_exception(code: int) -> None:
+def test_gateway_replies_with_its_exception(code: int) -> None:
     with sick({f"exception-0{code:x}": 1}) as place, client(place) as item:
         assert item.read(ETA) == f"ex {code}"
 
@@ -96,7 +96,7 @@ def test_bytes_of_words_are_swapped() -> None:
 
 
 @pytest.mark.parametrize("unit", [255, 0])
-def test_a_gateway_answers_one_unit_only(unit: int) -> None:
+def test_gateway_answers_one_unit_only(unit: int) -> None:
     with sick({"only-unit": unit}) as place, client(place) as item:
         assert item.read(ETA, unit=2) is None
     with sick({"only-unit": unit}) as place, socket.create_connection(place, timeout=5) as plain:
@@ -105,7 +105,7 @@ def test_a_gateway_answers_one_unit_only(unit: int) -> None:
         assert plain.recv(300) == bytes.fromhex(f"000100000005{unit:02X}03020637")
 
 
-def test_an_idle_connection_is_closed_and_a_busy_one_is_not() -> None:
+def test_idle_connection_is_closed_and_a_busy_one_is_not() -> None:
     with sick({"idle-close": 0.5}) as place:
         with client(place) as item:
             for _ in range(4):
@@ -116,7 +116,7 @@ def test_an_idle_connection_is_closed_and_a_busy_one_is_not() -> None:
             assert time.monotonic() - began > 0.4
 
 
-def test_a_gateway_that_speaks_rtu_only_does_not_answer_modbus_tcp() -> None:
+def test_gateway_that_speaks_rtu_only_does_not_answer_modbus_tcp() -> None:
     with sick({}, "rtu-tcp") as place:
         with client(place) as wrong:
             assert wrong.read(ETA) is None

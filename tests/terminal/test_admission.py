@@ -131,7 +131,7 @@ async def test_single_key_acts_but_a_burst_does_not() -> None:
         await until(pilot, lambda: app.done == ["run", "run"])
 
 
-async def test_a_key_at_once_acts_only_while_it_can_do_no_harm() -> None:
+async def test_immediate_key_acts_only_while_harmless() -> None:
     """When its turn has come, another screen may be there, on which it would command."""
     app = Panel()
     async with app.run_test() as pilot:

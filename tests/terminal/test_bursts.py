@@ -230,7 +230,7 @@ def test_key_waits_for_a_sequence_begun_with_it() -> None:
     assert [given.stroke.alone for given in keys_of(bursts.given(2.1, pending=2.06))] == [True]
 
 
-def test_a_harmless_key_does_not_wait_but_counts_as_one_of_its_burst() -> None:
+def test_harmless_key_does_not_wait_but_counts_as_one_of_its_burst() -> None:
     bursts = Bursts()
     bursts.key(pressed("2", 1.0), at_once=True)
     (shows,) = keys_of(bursts.given(1.0))
@@ -252,7 +252,7 @@ def test_only_the_first_key_after_a_pause_begins_a_burst() -> None:
     assert bursts.begins(pressed("3", 1.0 + BURST_GAP + 0.001))
 
 
-def test_a_stop_voids_a_harmless_key_that_was_not_handed_over() -> None:
+def test_stop_cancels_a_harmless_key_not_yet_delivered() -> None:
     bursts = Bursts()
     bursts.key(pressed("2", 1.0), at_once=True)
     bursts.stop(pressed("space", 1.0))

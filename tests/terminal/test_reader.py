@@ -69,7 +69,7 @@ def acting(keys: Sequence[Pressed], stamp: object) -> list[str]:
     return [key.name for key in keys if key.stroke.acts and key.stroke.stamp == stamp]
 
 
-def test_a_key_that_only_shows_something_does_not_wait() -> None:
+def test_key_that_only_shows_something_does_not_wait() -> None:
     reader = KeyReader(Stops(harmless="2m"))
     (key,) = reader.read(b"2", 1.0, 0)
     assert isinstance(key, Pressed)
@@ -80,14 +80,14 @@ def test_a_key_that_only_shows_something_does_not_wait() -> None:
     assert [key.stroke.acts for key in reader.tick(LATER) if isinstance(key, Pressed)] == [True]
 
 
-def test_a_key_that_only_shows_something_overtakes_none() -> None:
+def test_key_that_only_shows_something_overtakes_none() -> None:
     reader = KeyReader(Stops(harmless="2", done_to=LATER))
     assert reader.read(b"x2", 1.0, 0) == []
     keys = [key for key in reader.tick(LATER) if isinstance(key, Pressed)]
     assert [(key.name, key.stroke.acts) for key in keys] == [("x", False), ("2", False)]
 
 
-def test_keys_behind_one_that_acted_at_once_are_a_burst() -> None:
+def test_keys_after_an_immediate_key_are_a_burst() -> None:
     reader = KeyReader(Stops(harmless="2"))
     (first,) = reader.read(b"2", 1.0, 0)
     assert isinstance(first, Pressed)
@@ -98,7 +98,7 @@ def test_keys_behind_one_that_acted_at_once_are_a_burst() -> None:
 
 
 @pytest.mark.parametrize("data", [b"2\t", b"2m", b"2\x1b", b"2\x1b["])
-def test_a_key_with_more_in_its_read_waits(data: bytes) -> None:
+def test_key_with_more_in_its_read_waits(data: bytes) -> None:
     """Those keys have one time: a Space behind Tab would be text once the 2 had its effect."""
     reader = KeyReader(Stops(harmless="2m", done_to=LATER))
     assert reader.read(data, 1.0, 0) == []

@@ -88,7 +88,7 @@ def test_every_exception_for_a_generic_key_is_needed() -> None:
 
 
 @pytest.mark.parametrize("screen", EVERYWHERE)
-def test_a_key_has_one_action_on_a_screen(screen: str) -> None:
+def test_key_has_one_action_on_a_screen(screen: str) -> None:
     keys = [
         key
         for action in ACTIONS
@@ -338,7 +338,7 @@ SHOW = {
 }  # fmt: skip
 
 
-def test_only_keys_that_move_or_show_act_at_once() -> None:
+def test_only_keys_that_move_or_show_act_immediately() -> None:
     found = {
         screen: {key for key, only_shows in key_meanings(screen).items() if only_shows}
         for screen in EVERYWHERE
@@ -346,7 +346,7 @@ def test_only_keys_that_move_or_show_act_at_once() -> None:
     assert found == {screen: SHOW_EVERYWHERE | keys for screen, keys in SHOW.items()}
 
 
-def test_no_action_that_writes_or_asks_acts_at_once() -> None:
+def test_no_action_that_writes_or_asks_acts_immediately() -> None:
     words = ("arming", "asks", "write", "stop", "propose", "leave")
     careful = [a for a in ACTIONS if any(word in a.help.lower() for word in words)]
     assert len(careful) > 20
@@ -364,7 +364,7 @@ def at_once(app: DrivePanelApp, *keys: str) -> list[str]:
     ]  # fmt: skip
 
 
-async def test_a_key_that_commands_waits_wherever_it_is_pressed() -> None:
+async def test_key_that_commands_waits_wherever_it_is_pressed() -> None:
     async with bench("atv71") as made:
         app = made.app
         keys = ("r", "x", "k", "up", "left", "2", "enter", "y", "a", "]", "q", "5", "escape")
@@ -385,7 +385,7 @@ async def test_a_key_that_commands_waits_wherever_it_is_pressed() -> None:
         assert at_once(app, *keys) == [key for key in keys if key not in ("enter", "escape")]
 
 
-async def test_a_key_waits_while_the_one_before_has_its_effect_or_a_line_opens() -> None:
+async def test_key_waits_while_the_one_before_has_its_effect_or_a_line_opens() -> None:
     async with bench("atv71") as made:
         app = made.app
         await until(made.pilot, lambda: app.place == "monitor")
@@ -398,7 +398,7 @@ async def test_a_key_waits_while_the_one_before_has_its_effect_or_a_line_opens()
         assert not app.acts_at_once("3", "3", begins=True, after=done)
 
 
-async def test_a_key_waits_if_its_effect_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_key_waits_if_its_effect_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
     async with bench("atv71") as made:
         monkeypatch.setattr(made.app, "only_shows", None)
         assert at_once(made.app, "3") == []

@@ -236,7 +236,7 @@ def test_frame_fits_its_row_and_keeps_its_note(data: bytes, note: str, width: in
     assert ("…" in line.plain) == (data.hex(" ").upper() not in line.plain)
 
 
-def test_a_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:
+def test_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:
     profile = library.load("atv71")
     view = view_of(profile, fakes.RUNNING, age=7.0)
     reading = view.reading("RFR")

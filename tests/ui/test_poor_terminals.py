@@ -39,7 +39,7 @@ def test_monitor_on_a_poor_terminal(
 
 
 @pytest.mark.parametrize("terminal", ["plain signs", "vt100"])
-async def test_plain_signs_are_ascii_on_every_screen(
+async def test_plain_symbols_are_ascii_on_every_screen(
     terminal: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     app, screen = panel(SCENES["running"], monkeypatch, POOR[terminal])
