@@ -439,4 +439,28 @@ DEFECTS = (
         "The mains voltage at the last fault rules out a cause of the fault before.",
         ("tests/ui/test_fault_doctor.py",),
     ),
+    Defect(
+        "word-before-the-exact-code",
+        "tui/drive/profile/search.py",
+        "return EXACT, 0, 0",
+        "return TEXT, 0, 0",
+        "The cursor is on another parameter than the one whose code was typed, and Enter edits it.",
+        ("tests/drive/test_search.py",),
+    ),
+    Defect(
+        "search-with-accents",
+        "tui/drive/profile/search.py",
+        "if not unicodedata.combining(letter))",
+        "if True)",
+        "A French word is not found without its accents.",
+        ("tests/drive/test_search.py",),
+    ),
+    Defect(
+        "names-cut-alike",
+        "tui/widgets/drawing.py",
+        "free = [form for form in forms if form not in taken]",
+        "free = forms",
+        "Two rows of a list read alike, and the wrong one is edited.",
+        ("tests/ui/test_names_in_lists.py",),
+    ),
 )

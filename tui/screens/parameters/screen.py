@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Sequence
 from typing import ClassVar
 
@@ -10,6 +11,7 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Input
 
+from tui.drive.profile.search import parameter_search
 from tui.drive.settings.in_force import limits_in_force
 from tui.screens.parameters.detail_view import (
     SHORT,
@@ -161,6 +163,9 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     def action_search(self) -> None:
         """Into the search, at once: what is typed next is searched for."""
         self.set_focus(self.query_one("#search", Input))
+        # its words are prepared at the first search: not while a key is typed
+        prepared = asyncio.to_thread(parameter_search, self.session.profile)
+        self.run_worker(prepared, group="search", exclusive=True)
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
         """Those of the search."""
