@@ -2,9 +2,8 @@
 
     python -m benchmarks.block [--bauds 9600,19200] [--seconds S]
 
-The same drive, the same values: first with every slot unused, then with slots that stand for
-some of them. Times of cycles are taken between snapshots; the
-design is what the read plan counts.
+The same drive, the same values: first with every slot unused, then with slots that are mapped to
+some of them. Times of cycles are taken between snapshots; the design is what the read plan counts.
 """
 
 from __future__ import annotations
@@ -45,7 +44,7 @@ CASES: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
 none), and what the slots stand for."""
 RUN_HZ = 35.0
 PROVED_WITHIN = 60.0
-"""Seconds in which the monitor must have come to use the block for all it can."""
+"""Seconds until the monitor must use the block as far as possible."""
 WARM = 10
 """Cycles before anything is measured."""
 AS_DESIGNED = 1.1

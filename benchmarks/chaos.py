@@ -1,12 +1,12 @@
-"""Ends of every kind, at random moments: is the motor stopped, and what do the others notice?
+"""Programs ended in every way, at random moments: is the motor stopped, and do the others notice?
 
     python -m benchmarks.chaos [--rounds N] [--seed N] [--only TEXT] [--after S] [--lanes N]
 
 In each round a simulated line (RTU at 9600 or 19200 baud, or Modbus TCP) outlives all programs. A
 `run` or a panel runs the motor of drive 1, a `watch` observes both drives. Then the panel, the
-`run`, another `watch`, a `backup` or the keeper ends. The record of the line tells what came of it.
-In further kinds the adapter, the processor, the disk or the package fails, or, as root, a service,
-a log-in or a container ends.
+`run`, another `watch`, a `backup` or the keeper ends. The record of the line shows the result. In
+further kinds the adapter, the processor, the disk or the package fails, or, as root, a service, a
+log-in or a container ends.
 """
 
 from __future__ import annotations

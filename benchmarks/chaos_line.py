@@ -45,7 +45,7 @@ EVERY = 0.5
 FRESH, LONGEST_CYCLE = 1.5, EVERY + 2.0
 """Seconds that a good value may be older than its time, and its time than its cycle."""
 ENDS = 30.0
-"""Seconds in which a program has to end when it is told to."""
+"""Seconds in which a program must end on request."""
 LEFT = 15.0
 """Seconds that processes have to end after the last program."""
 ROUND_SETTING = "CHAOS_ROUND"
@@ -58,7 +58,7 @@ TURNS = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What the motor did at a time of the wall clock."""
+    """State of the motor at a wall-clock time."""
 
     at: float
     hertz: float
@@ -68,7 +68,7 @@ class Moment:
 
 @dataclass(frozen=True, slots=True)
 class LineRecord:
-    """What the line saw; times of the wall clock, which the JSON of programs tells, too."""
+    """Record of the line; wall-clock times, which the JSON of programs has too."""
 
     commands: list[tuple[float, int]]
     """Each command word to drive 1, and when its frame was whole."""
@@ -145,7 +145,7 @@ class _RecordedLine(SimulatedLine):
 
 
 def serve() -> None:
-    """Serve the line that the first line of the input describes; tell all for each other one."""
+    """Serve the line of the first input line; print the record for each further line."""
     job = json.loads(sys.stdin.readline())
     timing = LineTiming(job["baud"] or 19200, "8N1", bool(job["baud"]))
     own = {1: CONSTANTS[1] | {"TTO": round(10 * TIMEOUT)}, 2: CONSTANTS[2] | {COUNTER: 0}}
@@ -221,16 +221,16 @@ class ProgramOnTerminal:
 
     @property
     def output(self) -> str:
-        """All that it has written to its terminal, and what stands there."""
+        """Everything written to its terminal, and the current screen."""
         return b"".join(self._pieces).decode(errors="replace") + self.picture
 
     @property
     def picture(self) -> str:
-        """What stands on its terminal."""
+        """Current screen of its terminal."""
         return self._picture.text()
 
     def shows(self, *words: str) -> None:
-        """Wait until all these words stand on the terminal."""
+        """Wait until all these words are on the terminal."""
         wait_until(lambda: all(word in self.picture for word in words), f"{words} shown")
 
     def press(self, key: str) -> None:
@@ -306,7 +306,7 @@ class Observer:
 
     @property
     def output(self) -> str:
-        """What it said on standard error."""
+        """Its standard error."""
         return self._errors.read_text("utf-8")
 
     @property
@@ -429,7 +429,7 @@ class Stage:
         return program
 
     def output(self) -> str:
-        """What all programs said, with the log and the journal."""
+        """Output of all programs, with the log and the journal."""
         texts = [program.output for program in self.programs]
         texts += [path.read_text("utf-8") for path in self.state.glob("*.[lj]*") if path.is_file()]
         return "\n".join(texts) + (self.observer.output if self.observer else "")
@@ -451,7 +451,7 @@ class Stage:
         return not late and not (self.observer and self.observer.was_killed)
 
     def left(self) -> int:
-        """How many processes are left 15 s later; they are killed."""
+        """Count the processes left after 15 s; they are killed."""
         end = time.monotonic() + LEFT
         while (found := processes_of(self.folder)) and time.monotonic() < end:
             time.sleep(0.2)

@@ -184,7 +184,7 @@ class PlantStage(Stage):
         return None
 
     def output(self) -> str:
-        """What all programs said, with the logs and journals of all users."""
+        """Output of all programs, with the logs and journals of all users."""
         logs = [path.read_text("utf-8", "replace") for path in self.folder.glob("state-*/*.[lj]*")]
         return "\n".join([super().output(), *logs])
 

@@ -19,7 +19,7 @@ from tests.line.pty_panel import LINE_SETTLED
 from tests.programs import PATIENCE
 
 FROZEN = 2.0
-"""Seconds after which a program that gives no sign of life counts as gone, for a new keeper too."""
+"""Seconds without a heartbeat after which a program counts as gone, for a new keeper too."""
 KEYS = {"Ctrl-C": "\x03", "Ctrl-Z": "\x1a", "Ctrl-\\": "\x1c"}
 MOTOR = ("run", "panel")
 KILLED, CLOSED, THAWED, EXIT = "kill -9", "terminal closed", "SIGSTOP, SIGCONT", "exit"
@@ -27,12 +27,12 @@ DEAD_FROZEN, CRASH, LEFT_RUNNING = "SIGSTOP, kill -9", "error in drawing", "--le
 COMMON = (EXIT, *KEYS, KILLED, DEAD_FROZEN, THAWED, CLOSED)
 WITH_KEEPER, BESIDE = "kill -9 with its keeper", " beside a panel"
 REPORTED = re.compile(r"not stopped|runs since|runs on|left running|state is not known", re.I)
-"""What a program or a log says of a motor that goes on."""
+"""Text of a program or a log about a motor that keeps running."""
 
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of one round; times in s from the end of the program."""
+    """Result of one round; times in s from the end of the program."""
 
     number: int
     program: str
@@ -52,7 +52,7 @@ class Outcome:
 
 
 class HasMotor(Protocol):
-    """What runs the motor of a round."""
+    """Program that runs the motor of a round."""
 
     def send(self, number: signal.Signals) -> None:
         """Send it a signal, if it lives."""
@@ -110,7 +110,9 @@ class Round:
             self._victim = stage.start(program, "LINE", *more, "-d", "2", "-p", "atv71")
 
     def _end_victim(self) -> tuple[float, float | None, bool]:
-        """End the victim; when, until when a stop is due (None: none is), whether it must run."""
+        """End the victim. Return when, the deadline of a stop (None: none is due), and True if the
+        motor must run.
+        """
         outcome, victim, end = self._outcome, self._victim, self._end
         mine = outcome.program in MOTOR
         gone = TIMEOUT if self._beside else 0.0

@@ -18,7 +18,7 @@ End = tuple[float, float | None, bool]
 TYPED = "typed"
 """A `stop` in a shell ends the round of the program that runs the motor."""
 SLOW, SLOW_DISK = 10.0, 4.0
-"""Seconds that a stop may take on a slow computer, and for which a disk takes nothing."""
+"""Seconds that a stop may take on a slow computer, and for which a disk accepts nothing."""
 
 
 class _Altered(Round):
@@ -115,7 +115,7 @@ class _DiskStage(Stage):
 
 
 class SlowDisk(_Altered):
-    """The disk takes nothing until the round was judged, or for seconds if a keeper is to start."""
+    """Block the disk until the round is judged, or for seconds if a keeper is to start."""
 
     suffix = ", disk stalls"
     stage_of = _DiskStage

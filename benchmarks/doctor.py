@@ -1,12 +1,12 @@
-"""Verdicts of `drivepanel why` on sick lines: right or not, and what they cost the line.
+"""Verdicts of `drivepanel why` on faulty lines: correct or not, and their cost on the line.
 
     python -m benchmarks.doctor [--only NAME] [--seed N ...]
 
-Twenty troubles and two lines that are well. Each is a simulated Altivar 71 behind a trouble of
+Twenty troubles and two healthy lines. Each is a simulated Altivar 71 behind a trouble of
 `drivepanel simulate --line-fault`; a person would find it by hours of work. For each, the verdict
 of `why LINE --json` is compared with the trouble. A wrong one that `why` calls certain or likely
-counts as confidently wrong; so does one without any word of its certainty. What reaches the line
-is recorded there: frames, and among them writes, of which there must be none.
+counts as confidently wrong; so does one without any word of its certainty. What reaches the line is
+recorded there: frames, and among them writes, of which there must be none.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Case:
     scheme: str = "serial"
     """Scheme by which `why` opens the line."""
     served: str = ""
-    """What the line really speaks, if that is another."""
+    """Settings of the line, if they differ from those typed."""
     settings: str = ",19200,8E1"
     device: int = DEVICE
 
@@ -97,7 +97,7 @@ class Recorded:
 
     def feed(self, data: bytes, now: float) -> None:
         """Take bytes that have just come in."""
-        # a frame of the other protocol is no request there
+        # a frame of the other protocol is not a request there
         whole = is_sealed(data) if self._place == 1 else data[2:4] == bytes(2)
         if len(data) > self._place and whole:
             self._functions.append(data[self._place])
@@ -139,7 +139,7 @@ class RecordedLine(Simulation):
 
 @dataclass(frozen=True, slots=True)
 class Result:
-    """What `why` said of one line, and what it cost."""
+    """Verdict of `why` on one line, and its cost."""
 
     case: Case
     verdict: str

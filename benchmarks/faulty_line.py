@@ -70,15 +70,16 @@ LATE = Faults(0.15, 0, 0, 0, 0, 0, 0, 0, 0)
 
 @dataclass(slots=True)
 class Setting:
-    """How the line behaves; times in s."""
+    """Behavior of the line; times in s."""
 
     seed: int = 1
     faults: Faults = MIXED
     turnaround: float = 0.0005
     character: float = 0.0
     slow_once: float = 0.0
-    """The drive is slow at the tenth request, by so many seconds, and then answers all that it
-    was sent meanwhile, in order; nothing else is wrong."""
+    """Seconds by which the drive is late at the tenth request. It then answers all requests in
+    order; nothing else is wrong.
+    """
     behind_from: int | None = None
     """From this request on, each one gets the reply to the one before; nothing else is wrong."""
 
@@ -201,7 +202,7 @@ class _Server:
 def _spoilt(
     kind: str, right: bytes, chance: random.Random, setting: Setting
 ) -> list[tuple[float, bytes]]:
-    """What is sent in place of the right reply: seconds to wait yet, and bytes."""
+    """Sequence sent instead of the correct reply: seconds to wait, and bytes."""
     cut = chance.randrange(1, len(right))
     late = setting.slow_once or chance.uniform(setting.faults.late_from, setting.faults.late_to)
     other = DEVICES[(DEVICES.index(right[0]) + 1) % len(DEVICES)]
@@ -224,7 +225,7 @@ def _spoilt(
 
 
 def _longer(body: bytes) -> bytes:
-    """A well-formed answer of one word more than was asked for, or to a write of one more."""
+    """A well-formed reply with one word more than requested or written."""
     if body[0] == 3:
         return bytes([3, body[1] + 2]) + body[2:] + body[-2:]
     return body[:-1] + bytes([body[-1] + 1])

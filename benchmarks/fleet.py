@@ -1,9 +1,9 @@
-"""Many simulated drives on one line, all watched at once: how full, how even, at what cost.
+"""Many simulated drives on one line, all monitored: line load, evenness and cost.
 
     python -m benchmarks.fleet [--drives N] [--seconds S] [--period S]
     python -m benchmarks.fleet --serve [--lines N] [--drives N] [--seconds S]
 
-With --serve `drivepanel serve` reads them for Prometheus, with a cycle wished each second. Without,
+With --serve `drivepanel serve` reads them for Prometheus, with a configured cycle of 1 s. Without,
 this program reads them: once all drives answer; once, from the same start, one of them is switched
 off. All drives read their slow values at about the same time, in every tenth cycle: a stretch of
 time holds that or not, so only stretches at the same distance from the start can be compared.
@@ -139,7 +139,7 @@ def figures(
 
 
 def _values(record: Record, drives: Mapping[int, str]) -> Counter[int]:
-    """How many monitored values were in the replies of each drive."""
+    """Number of monitored values in the replies of each drive."""
     addresses = {}
     for family in set(drives.values()):
         profile = load(family)
@@ -223,7 +223,7 @@ def served(given: argparse.Namespace) -> dict[str, Any]:
 def followed(
     process: subprocess.Popen[str], begun: float, given: argparse.Namespace
 ) -> dict[str, Any]:
-    """What its metrics tell, looked at each second."""
+    """Metrics of the service, read each second."""
     assert process.stdout is not None
     url = re.search(r"metrics at (http:\S+metrics)", process.stdout.readline())
     assert url is not None, "serve did not start"

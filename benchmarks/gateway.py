@@ -58,7 +58,7 @@ STORED_SEVERAL = f"{CLIENTS} clients, values fresh for {FRESH:g} s"
 
 
 def mbpoll_reads(seconds: float, *where: str) -> int:
-    """How often mbpoll got all words in so many seconds."""
+    """How often mbpoll got all words in this many seconds."""
     options = f"-a {DEVICE} -0 -r {ADDRESS} -c {WORDS} -t 4:hex -l {MBPOLL_PERIOD_MS}".split()
     process = subprocess.Popen(
         ["stdbuf", "-oL", "mbpoll", *options, *where], stdout=subprocess.PIPE, text=True
@@ -70,7 +70,7 @@ def mbpoll_reads(seconds: float, *where: str) -> int:
 
 
 async def client_reads(port: int, clients: int, seconds: float) -> tuple[int, float]:
-    """How many answers so many clients got, each asking as soon as it has one; until when, in s."""
+    """Number of replies that the clients got, each sending as soon as it has one; deadline in s."""
     begun = time.monotonic()
     end = begun + seconds
     counts = await asyncio.gather(*(_one_client(port, end) for _ in range(clients)))

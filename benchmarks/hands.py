@@ -1,4 +1,4 @@
-"""What a person's hands, a paste and a hung link do to a motor, counted on the wire.
+"""Effects of typing, pastes and a hung link on a motor, counted on the wire.
 
     python -m benchmarks.hands [--bursts N] [--keys N] [--seed N]
 
@@ -7,9 +7,9 @@ keeps every write. First bursts: the drive is armed, sometimes with the run line
 running, and a random piece of keys with one stop key in it arrives in one read or cut at random
 places, as after a link that hung. The same while a question of Control, of the proof or of Frames
 stands or is carried out, and on two panels of one line of which either gets the stop. Then keys:
-random ones, alone and in pieces, and each by itself, with the drive not armed. Counted is every
-write that is no stop; each must be 0. Last, ends: every signal, resizes, keys while a line opens,
-and an error in the drawing of each screen, each with a motor running.
+random ones, alone and in pieces, and each by itself, with the drive not armed. It counts every
+write that is not a stop; the count must be 0. Last, ends: every signal, resizes, keys while a line
+opens, and an error in the drawing of each screen, each with a motor running.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ REFERENCE = 8502
 STOPS = (b" ", b"\x1b[24~", b"\x1b[20~")
 """Space, F12 and F9 as terminals send them."""
 KEYS = [bytes([code]) for code in range(33, 127) if code != ord("q")]
-"""Without q, which leaves a panel whose motor stands, and ends the count."""
+"""Without q, which leaves a panel whose motor is at standstill, and ends the count."""
 KEYS += [b"\r", b"\t", b"\x7f", b"\x1b[A", b"\x1b[B", b"\x1b[5~", b"\x1b[6~", b"\x1b", b"\x1bOP"]
 TEXTS = {b"/", b"n", b"O", b"j"}
 """Keys that open a text, where a Space is one: a search, the name of a line, a filter."""
@@ -60,12 +60,12 @@ LATE = 3.0
 AWAY = 0.12
 """Longest pause inside a piece that a link cuts, in s."""
 STOP_WORDS = {7, 2, 0, 0x010F}
-"""What may go into the command word of an Altivar 71 unasked: only words that stop."""
+"""Values allowed in the command word of an Altivar 71 without a key: words that stop."""
 
 
 @dataclass(slots=True)
 class Counted:
-    """What went out."""
+    """Writes on the line."""
 
     pieces: int = 0
     keys: int = 0
@@ -85,7 +85,7 @@ Lead = Callable[[PtyPanel, random.Random], None]
 
 
 def is_stop(write: Write) -> bool:
-    """Whether a write can only stop the motor."""
+    """Return True if the write can only stop the motor."""
     return write.register == COMMAND and write.words[0] in STOP_WORDS
 
 
@@ -145,7 +145,7 @@ def to_the_run_line(panel: PtyPanel, chance: random.Random) -> None:
 
 
 def to_a_question(panel: PtyPanel, chance: random.Random) -> None:
-    """A question stands, or what it asks about has just begun."""
+    """Open a question, or just begin its action."""
     home(panel)
     arm(panel)
     for key in chance.choice([*QUESTIONS.values()]):
@@ -186,7 +186,7 @@ def bursts(
         settle(panel, beside=beside)
         text = stop == b" " and not TEXTS.isdisjoint(before_keys)
         if not text and not any(map(is_stop, panel.log.writes[before:])):
-            settle(panel, LATE, beside=beside)  # a busy machine is no lost stop
+            settle(panel, LATE, beside=beside)  # a busy machine is not a lost stop
         sent = panel.log.writes[before:]
         counted.pieces += 1
         counted.keys += len(before_keys) + 1
@@ -216,7 +216,7 @@ def bursts(
 
 
 def _disarmed(panel: PtyPanel) -> bool:
-    """Whether the screen says within a second that the drive is not armed."""
+    """Return True if the screen says within a second that the drive is not armed."""
     end = time.monotonic() + 1.0
     while panel.armed and time.monotonic() < end:
         panel.look(0.02)

@@ -1,4 +1,4 @@
-"""How a panel ends, or goes on, with a motor running: signals, resizes, early keys, its own errors.
+"""Ends of a panel with a running motor: signals, resizes, early keys, internal errors.
 
 Part of `python -m benchmarks.hands`. Each case starts a panel on a pseudo-terminal, runs the motor
 by keys, and counts what passes the relay on its line.

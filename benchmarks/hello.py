@@ -1,8 +1,8 @@
-"""The least that Textual can be: one text on the screen; `w` changes it, `?` asks, `q` leaves.
+"""The smallest Textual program: one text on the screen; `w` changes it, `?` asks, `q` exits.
 
     python -m benchmarks.hello [TEXTS LINES]
 
-With so many texts beside each other, each of so many lines, `w` changes all of them.
+With TEXTS texts side by side, each of LINES lines, `w` changes all of them.
 """
 
 from __future__ import annotations

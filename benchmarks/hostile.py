@@ -3,8 +3,8 @@
     python -m benchmarks.hostile [--cases N] [--seed S] [KIND...]
 
 10 000 cases by default, shared out among profiles, parameter sets, block files, files of the state
-folder and replies of drives. A case that fails is told with its number; the same seed and number
-make the same case. Exit status 1 where one failed.
+folder and replies of drives. A failing case is reported with its number; the same seed and number
+make the same case. Exit status 1 if one failed.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ LONGEST_CASE = 20.0
 
 
 class Hang(BaseException):
-    """A case did not come to its end."""
+    """A case did not end."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """What became of the cases of one kind."""
+    """Results of the cases of one kind."""
 
     cases: int = 0
     slowest: float = 0.0
@@ -89,7 +89,7 @@ def run(kind: str, cases: int, seed: int) -> Tally:
 
 
 def main() -> int:
-    """Run the cases and tell what became of them."""
+    """Run the cases and report the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("kinds", nargs="*", metavar="KIND", help=", ".join(CASES))
     parser.add_argument("--cases", type=int, default=10_000)

@@ -1,7 +1,7 @@
-"""What files, drives and people may bring, broken at random: one function a kind of it.
+"""Randomly damaged input from files, drives and people: one function per kind.
 
-Each takes a random source and a folder of its own, makes one case, and uses what it brings as the
-panel would. Whatever it raises beside the errors that are told in a sentence is a defect.
+Each takes a random source and a folder of its own, makes one case, and uses it as the panel would.
+Any exception other than an error reported in a sentence is a defect.
 """
 
 from __future__ import annotations
@@ -93,7 +93,7 @@ def _lines(text: bytes, chance: random.Random) -> bytes:
 
 
 def _value(text: bytes, chance: random.Random) -> bytes:
-    """Something else in place of what stands behind an equals sign or a colon."""
+    """Replace the value after an equals sign or a colon."""
     found = list(re.finditer(rb"(?:= |: )([^\n,}\]]+)", text))
     if not found:
         return text
@@ -185,7 +185,7 @@ def _whole_set(profile: Profile, chance: random.Random) -> ParameterSet:
 
 
 def set_case(chance: random.Random, folder: Path) -> None:
-    """A parameter set that somebody edited: read, compared, reported."""
+    """A parameter set edited by another source: read, compared, reported."""
     from tui.session.report import report_text
 
     profile = library.load(chance.choice(FAMILIES))
@@ -201,7 +201,7 @@ def set_case(chance: random.Random, folder: Path) -> None:
 
 
 def block_case(chance: random.Random, folder: Path) -> None:
-    """A file of assignments that somebody edited."""
+    """An assignment file edited by another source."""
     profile = library.load(chance.choice(("atv21", "atv71", "atv31", "atv312")))
     plans = [
         Assignment(block, tuple(chance.choice((0, chance.randrange(0x10000))) for _ in block.slots))
@@ -242,7 +242,7 @@ def _state_files(chance: random.Random) -> Mapping[str, object]:
 
 
 def state_case(chance: random.Random, folder: Path) -> None:
-    """One file of the state folder, of any content or kind: read, and written anew."""
+    """One file of the state folder, of any content or kind: read, and rewritten."""
     from tui.session.teaching.kept import TaughtDrive
 
     os.environ["DRIVEPANEL_STATE"] = str(folder)
@@ -393,7 +393,7 @@ def _understood(request: Request, pdu: bytes) -> None:
             identity = identity_from(
                 1, IdentificationObjects(reported.conformity, reported.objects)
             )
-            # whoever shows it, and wherever
+            # on any output
             no_commands(f"{identity.vendor}{identity.reference}{identity.version}{identity.name}")
         case Diagnose():
             diagnostic_of(pdu)

@@ -16,7 +16,9 @@ from benchmarks.chaos_line import ROUND_SETTING
 from tests.programs import DRIVEPANEL
 
 LOGGED_IN, LEFT_ALONE = "logged-in", "left-alone"
-"""Files in the folder of the round: the log-in lasts while the one is there; id of its program."""
+"""Files in the folder of the round. The login lasts while the first exists; the other has the id of
+its program.
+"""
 KEPT = (ROUND_SETTING, "DRIVEPANEL_SHARE_GROUP", "DRIVEPANEL_SHARE_FOLDER", "PYTHONPATH",
         "DRIVEPANEL_STATE", "DRIVEPANEL_CONFIG", "TERM", "LC_ALL")  # fmt: skip
 

@@ -3,7 +3,7 @@
     python -m benchmarks.instructions
 
 Needs valgrind. Counts until the frame with the last words of the first picture is handed to the
-terminal; what is compiled is compiled before.
+terminal; compilation is done before.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ def instructions(module: str, words: str, size: tuple[int, int], folder: Path) -
     count = ("valgrind", "--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null")
     for command in (python, (*count, f"--log-file={log}", *python)):
         terminal = Terminal(command, size, ROOT, environment)
-        with suppress(NotShown):  # it ends by itself
+        with suppress(NotShown):  # it ends without a signal
             terminal.run(PATIENCE)
         with suppress(ProcessLookupError):
             terminal.close()

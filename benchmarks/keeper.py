@@ -1,11 +1,11 @@
-"""What the keeper of a line costs, and how long its loss is felt.
+"""Cost of the keeper of a line, and duration of the effects of its loss.
 
     python -m benchmarks.keeper [--rounds N] [--seconds S]
 
 Five simulated drives at 19200 baud, in a process of their own. Compared in one run:
 
-- `drivepanel read` with a new keeper, with one that waits from the command before, and without
-  one: seconds from the start of the command to its end;
+- `drivepanel read` with a new keeper, with one that waits from the command before, and without one:
+  seconds from the start of the command to its end;
 - `drivepanel watch` of the five drives at 2 Hz, and the panel with its Monitor: memory of the
   keeper, and processor time of keeper and program together against that of a program which holds
   the line itself;
@@ -48,7 +48,7 @@ SIZE = 80, 24
 
 
 def keeper_of(state: Path) -> int | None:
-    """The process id of the one keeper whose lock lies in a state folder."""
+    """Process id of the only keeper whose lock is in a state folder."""
     for lock in (state / "lines").glob("*.lock"):
         owner = owner_of_lock(lock)
         if owner is not None and owner.socket and not has_ended(owner.program):

@@ -2,10 +2,10 @@
 
     python -m benchmarks.keys [--panel FOLDER] [--before]
 
-Each task is a list of keys with what has to stand on the screen before the next one is pressed;
-counted are the keys, and the seconds until the last words stand there. What a person reads and
-thinks is not in it. `--panel` runs the panel of another checkout, `--before` the keys that
-version 0.1 needed for the same.
+Each task is a list of keys, with the text that must be on the screen before the next key. It counts
+the keys, and the seconds until the last text appears. Time for reading and thinking is not
+included. `--panel` runs the panel of another checkout, `--before` the keys that version 0.1 needed
+for the same.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from tui.simulator.drive import SimulatedDrive
 Step = tuple[str, str]
 """A key as tmux names it, and the words to wait for behind it; none where empty."""
 SETTLED = 0.35
-"""Seconds that a question has to stand before its answer counts."""
+"""Seconds that a question must be open before its answer counts."""
 SLACK = 0.1
 """Seconds between two keys with nothing to wait for: nearer ones count as one piece."""
 
@@ -125,7 +125,7 @@ def press(terminal: Terminal, step: Step) -> None:
 
 
 def _text(terminal: Terminal) -> str:
-    """What stands on the terminal; a drive that is not armed is no armed one."""
+    """Text of the terminal; "not armed" does not match "armed"."""
     return terminal.text().replace("NOT ARMED", "not armed")
 
 

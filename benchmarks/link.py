@@ -1,11 +1,11 @@
-"""The panel over SSH on a slow link: start, keys, bytes, and how late the screen is.
+"""The panel over SSH on a slow link: start, keys, bytes, and delay of the screen.
 
     python -m benchmarks.link [--rounds N] [--presses N] [--seconds S] [--link NAME] [--only NAME]
 
 Each program runs behind a private SSH server on loopback; between it and the client stands a link
 of so many bytes a second and so long a round trip (link_proxy). Times of a start count from the
-word that the login prints before it becomes the program, so that what the login itself takes is
-told apart; times of a key count from its byte. The aims are told beside the figures, not asserted.
+word that the login prints before it becomes the program, so that the time of the login is separate;
+times of a key count from its byte. The targets are printed with the figures, not asserted.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ SETTLED = 3.0
 GAPS = (0.5, 1.5)
 """Shortest and longest time in s from an answered key to the next one."""
 BUDGET = 90.0
-"""Seconds after which no further round of keys begins; what was counted stands."""
+"""Seconds after which no further round of keys begins; earlier counts are kept."""
 TRIPS = 3
 TRIPPED = saying_all(r"\A.*(FAULT|TRIP|Overbraking)")
 """The strip says that the drive has tripped."""
@@ -55,7 +55,7 @@ TRIPPED = saying_all(r"\A.*(FAULT|TRIP|Overbraking)")
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """What every measurement takes."""
+    """Inputs of every measurement."""
 
     host: Host
     drive: Drive
@@ -149,7 +149,7 @@ def _times(times: Sequence[tuple[float | None, float | None]]) -> Figures:
 
 
 def at_rest(setup: Setup, program: Program, terminal: Terminal) -> Figures:
-    """Bytes a second while nobody touches anything; how late a clock on the screen is."""
+    """Bytes per second without any input; delay of a clock on the screen."""
     lags: list[float] = []
     shown: list[float] = []
 
@@ -219,7 +219,7 @@ def measure(setup: Setup, program: Program) -> Figures:
 
 
 def measure_all(setup: Setup, console: Console) -> dict[str, dict[str, Figures]]:
-    """Every program on every link that was asked for."""
+    """Every program on every selected link."""
     options = setup.options
     chosen = {n: p for n, p in setup.programs.items() if not options.only or n in options.only}
     for program in chosen.values():  # the first start fills the caches
@@ -239,7 +239,7 @@ def measure_all(setup: Setup, console: Console) -> dict[str, dict[str, Figures]]
 
 
 def environment(folder: Path) -> dict[str, str]:
-    """What programs behind the link find set."""
+    """Settings that programs behind the link see."""
     return {
         "LC_ALL": "C.UTF-8",
         "COLORTERM": "truecolor",

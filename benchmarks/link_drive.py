@@ -1,4 +1,4 @@
-"""A running Altivar 71 in a process of its own that is told when to trip and to run again.
+"""A running Altivar 71 in its own process, which trips and runs again on command.
 
 python -m benchmarks.link_drive LINK     serves on a pseudo-terminal; `trip`, `restart` on stdin
 """
@@ -59,8 +59,8 @@ def telling_drive(folder: Path) -> Iterator[Drive]:
 
 
 def main() -> None:
-    """Serve until nobody tells anything any more."""
-    # it goes on where nobody asks it between two programs
+    """Serve until the input ends."""
+    # it runs on without polling between two programs
     spec = DriveSpec("atv71", 1, sets={"SLL": 0}, run_hz=RUN_HZ, wander=True)
     with Simulation([spec], timing=LineTiming(BAUD, FORMAT, True)) as simulation:
         simulation.serve_pty(sys.argv[1])

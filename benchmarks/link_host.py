@@ -1,7 +1,7 @@
 """A private SSH server on loopback behind a link, and the command that runs a program there.
 
-The server has a host key and a user's key of its own in a folder of its own, and lets in nobody
-else. Programs run in a login of the user of the benchmark.
+The server has its own host key and user key in its own folder, and accepts no other. Programs run
+in a login of the user of the benchmark.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ PrintLastLog no
 
 
 def missing() -> str | None:
-    """What a private SSH server takes and is not here, in words; None if all is here."""
+    """What a private SSH server needs and is missing, in words; None if all is available."""
     for name, package in (
         ("sshd", "openssh-server"),
         ("ssh", "openssh-client"),
@@ -99,9 +99,9 @@ class Host:
 
 @contextmanager
 def ssh_host(folder: Path, environment: Mapping[str, str]) -> Iterator[Host]:
-    """A private SSH server behind a link without a limit; `missing()` first tells what is not here.
+    """A private SSH server behind a link without a limit; `missing()` names missing programs.
 
-    `environment` is that of the programs there. Raises RuntimeError where it does not start.
+    `environment` is that of the programs behind it. Raises RuntimeError if it does not start.
     """
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port: int = probe.getsockname()[1]

@@ -1,6 +1,6 @@
-"""The programs that `link` runs over a link, and what their pictures say when.
+"""The programs that `link` runs over a link, and the text of their pictures.
 
-All is told from the text of a picture, colors are not seen.
+All checks use the text of a picture, not colors.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from benchmarks.hello import TEXTS
 from benchmarks.panel import HELLO, PANEL, word_sign
 
 Shown = Callable[[str], bool]
-"""Whether a picture shows something."""
+"""Check of a picture: True if it shows something."""
 UPTIME = Path("/proc/uptime")
 HTOP_HELP = re.compile(r"Released under|strace")
 RUNNING = re.compile(r"FORWARD.* \d+\.\d +Hz")
@@ -44,24 +44,24 @@ MONITOR = (
 
 
 def saying_all(*patterns: str) -> Shown:
-    """Whether every one of these patterns is on the picture."""
+    """Return a check that all of these patterns are on the picture."""
     found = [re.compile(pattern) for pattern in patterns]
     return lambda text: all(pattern.search(text) for pattern in found)
 
 
 def saying_none(*patterns: str) -> Shown:
-    """Whether none of these patterns is on the picture."""
+    """Return a check that none of these patterns is on the picture."""
     found = [re.compile(pattern) for pattern in patterns]
     return lambda text: not any(pattern.search(text) for pattern in found)
 
 
 def both(shown: Shown, other: Shown) -> Shown:
-    """Whether both hold."""
+    """Return a check that both hold."""
     return lambda text: shown(text) and other(text)
 
 
 def tabs(text: str) -> object:
-    """The line of the tabs; the one that is shown has more room around it."""
+    """The line of the tabs; the active one has more space around it."""
     return text.split("\n")[1]
 
 
@@ -73,8 +73,9 @@ class Press:
     key: str
     sign: Callable[[str], object]
     complete: Callable[[str, str], bool] | None = None
-    """Whether the picture before the key and the one now show that all of it has come; without,
-    it has come when the sign stays as it is."""
+    """Check that compares the picture before the key with the current one: True if all of it has
+    arrived. Without it, a picture is complete once its sign stays unchanged.
+    """
 
 
 def becoming(shown: Shown) -> Callable[[str, str], bool]:
@@ -83,12 +84,12 @@ def becoming(shown: Shown) -> Callable[[str, str], bool]:
 
 
 def other_text(before: str, now: str) -> bool:
-    """Whether the bare Textual program shows its other text whole."""
+    """Return True if the bare Textual program shows its other text completely."""
     return any(text in now and text not in before for text in TEXTS)
 
 
 def htop_turned(before: str, now: str) -> bool:
-    """Whether htop's help has come whole, or gone whole."""
+    """Return True if the help of htop is complete, or completely gone."""
     if HTOP_HELP.search(before):
         return "F10Quit" in now and not HTOP_HELP.search(now)
     return bool(re.search(r"strace\s*\Z", now)) and "Released under" in now
@@ -112,7 +113,7 @@ HTOP_KEYS = (Press("? help", "?", lambda text: text.split("\n")[-1], htop_turned
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """What is run, and what its picture says when it has come so far."""
+    """A program to run, and the text of its picture at each step."""
 
     command: tuple[str, ...]
     first: Shown
@@ -121,7 +122,7 @@ class Program:
     state: Shown | None = None
     """The motor's state can be read."""
     complete: Shown | None = None
-    """All values stand, and the keys."""
+    """All values and the keys are shown."""
     settles: bool = False
     """Its picture says nothing in its last row: it is there when nothing more comes."""
     compressed: bool = False
@@ -154,7 +155,7 @@ def programs(line: str) -> dict[str, Program]:
 
 
 def behind_uptime(text: str) -> float | None:
-    """How many s the uptime that htop shows is behind the real one; None where it shows none."""
+    """Delay in s of the uptime that htop shows; None if it shows none."""
     found = re.search(r"Uptime: (?:(\d+) days?, )?(\d+):(\d\d):(\d\d)", text)
     if found is None:
         return None

@@ -1,4 +1,4 @@
-"""A slow link between two ends of a TCP connection: so many bytes a second, so long on their way.
+"""A slow link between two ends of a TCP connection, with a rate and a delay.
 
 What the link takes in it carries at its rate, piece after piece, in both directions at once; the
 last byte of a piece arrives half a round trip after it was carried. The link keeps next to nothing
@@ -19,7 +19,7 @@ from queue import SimpleQueue
 PIECE = 128
 """Bytes that a shaped link takes at once; small against a picture."""
 BUFFER = 4096
-"""Bytes that the system is asked to keep for a shaped link, as a modem or a radio does."""
+"""Bytes that the system may buffer for a limited link, as a modem or a radio does."""
 SEGMENT = 536
 """Most bytes of a TCP segment on a shaped link. With loopback's own of 64 kB the sender's system
 would keep megabytes at once, which none does on a slow line."""
@@ -28,7 +28,7 @@ UNSHAPED_PIECE = 65536
 
 @dataclass(frozen=True, slots=True)
 class Link:
-    """What a link is like: bytes a second each way, None without a limit; a round trip in s."""
+    """Properties of a link: bytes per second each way, None without a limit; round trip in s."""
 
     rate: float | None = None
     round_trip: float = 0.0
@@ -108,7 +108,7 @@ class Proxy:
             self._carry(target, client, link, "down")
 
     def _carry(self, source: socket.socket, sink: socket.socket, link: Link, way: str) -> None:
-        """Start one direction: a thread that takes bytes in, and one that hands them over."""
+        """Start one direction: a thread that reads bytes, and one that passes them on."""
         flight: SimpleQueue[tuple[float, bytes]] = SimpleQueue()
         for work in (
             lambda: _take(source, flight, link),
@@ -126,7 +126,7 @@ class Proxy:
                 if not data:
                     sink.shutdown(socket.SHUT_WR)
                     return
-                # counted first: whoever has seen the bytes finds them counted
+                # counted first, so that received bytes are always counted
                 setattr(self, way, getattr(self, way) + len(data))
                 sink.sendall(data)
 

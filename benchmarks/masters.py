@@ -1,6 +1,6 @@
-"""Who asks a simulated drive for its monitoring set: the panel, parts of it, other Modbus masters.
+"""Masters that read the monitoring set of a simulated drive: the panel, parts of it, others.
 
-Each contestant runs in a process of its own and tells when its cycles ended.
+Each contestant runs in its own process and reports the ends of its cycles.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ MBPOLL_PERIOD_MS = 11
 """The shortest that mbpoll takes is over 10."""
 
 CYCLE_END = struct.Struct("d")
-"""When a cycle of the panel ended, as its process tells it."""
+"""Times at which cycles of the panel ended, as its process reports."""
 OURS = "Line + Reader"
 PANEL = "whole panel"
 ONE_BY_ONE = "pymodbus, a value each, silence"
@@ -160,7 +160,7 @@ def _tell(pipe: int) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Cell:
-    """One family at one baud, with what its drive is asked."""
+    """One family at one baud, with the requests to its drive."""
 
     wire: WireLine
     family: str
@@ -176,7 +176,7 @@ class Cell:
         return self.least(self.blocks)
 
     def job(self, **more: object) -> dict[str, object]:
-        """What a worker needs to know."""
+        """Inputs of a worker."""
         timing = self.wire.timing
         return {
             "text": self.wire.text,
@@ -202,9 +202,9 @@ class Contestant:
     name: str
     run: Run
     whole: bool = True
-    """Whether a cycle reads the whole monitoring set."""
+    """True if a cycle reads the whole monitoring set."""
     once: bool = False
-    """Whether it runs in the first round only: its start takes long."""
+    """True if it runs in the first round only, because its start is slow."""
 
 
 def by_worker(worker: Worker, who: str, spans: str = "blocks", silence: bool = False) -> Run:

@@ -1,10 +1,10 @@
-"""The panel as its terminal sees it: start, keys, bytes, CPU and memory, beside two peers.
+"""The panel on its terminal: start, keys, bytes, CPU and memory, compared with two peers.
 
     python -m benchmarks.panel [--rounds N] [--seconds S] [--presses N]
 
-The panel watches one simulated, running Altivar 71 that a process of its own serves at 19200
-baud in real time. A bare Textual program and htop at 10 refreshes a second run on the same kind
-of pseudo-terminal, one program at a time. The aims are told beside the figures, not asserted.
+The panel watches one simulated, running Altivar 71 that a process of its own serves at 19200 baud
+in real time. A bare Textual program and htop at 10 refreshes a second run on the same kind of
+pseudo-terminal, one program at a time. The targets are printed with the figures, not asserted.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ SLOW = 20_000.0
 """Bytes a second of the slow terminal."""
 PANEL = (sys.executable, "-m", "tui")
 SIMULATED = ("--format", "8N1", "--real-time", "--run", "50", "--set", "SLL=0")
-"""A drive that goes on where nobody asks it between two programs."""
+"""A drive that runs on without polling between two programs."""
 HELLO = (sys.executable, "-m", "benchmarks.hello")
 HTOP = ("htop", "-d", "1")
 AS_MUCH = {(80, 24): (1, 6), (120, 40): (4, 17)}
@@ -50,7 +50,7 @@ FIRST_WORDS = (
     "hoose a line and press",
     "? help",
 )
-"""What the first full picture of the panel says, from its first row to its last one."""
+"""Texts of the first full picture of the panel, from its first row to its last."""
 SETTLED = 1.0
 CHOSEN = 0.5
 """Seconds after which Enter counts in the palette."""
@@ -60,9 +60,9 @@ LOW_SECONDS = 6.0
 
 
 def word_sign(text: str) -> tuple[object, ...]:
-    """The word of bits that Monitor shows first: its title and the names of its bits.
+    """The bit word that Monitor shows first: its title and bit names.
 
-    Where the trend stands in its place, that.
+    If the trend is shown instead, that.
     """
     rows = text.split("\n")
     for y, row in enumerate(rows):
@@ -322,7 +322,7 @@ def show(console: Console, size: str, figures: Figures) -> None:
 
 
 def show_ratios(console: Console, size: str, figures: Figures) -> None:
-    """Print what is asked of the panel as ratios to its peers in the same run."""
+    """Print the figures of the panel as ratios to its peers in the same run."""
     ours, peer = figures["10 Hz"], figures["htop"]
     for bare, name, words in (
         ("as much", "key", "a text that changes"),

@@ -1,6 +1,6 @@
 """A computer of a plant in namespaces: systemd as its first process, with log-ins and users.
 
-Nothing of it lasts: what it writes lies in memory, above the files of this computer. As root only.
+Its writes stay in memory, above the files of this computer. Needs root.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LINGERS = "stays"
 """A user whose processes outlive the session."""
 STARTS_WITHIN, ENDS_WITHIN = 60.0, 10.0
 PLACE = "/var/chaos"
-"""Where each program of each user may work."""
+"""Folder in which each program of each user may work."""
 CONTROL_GROUPS = ("/sys/fs/cgroup/unified", "/sys/fs/cgroup")
 UNWANTED = ("systemd-sysctl", "systemd-binfmt", "systemd-modules-load", "systemd-remount-fs",
             "systemd-timesyncd", "networking")  # fmt: skip

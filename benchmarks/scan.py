@@ -1,10 +1,10 @@
-"""A search for drives against what its line allows: one setting, all settings, a hit on the screen.
+"""A scan compared with the limit of its line: one setting, all settings, a hit on the screen.
 
     python -m benchmarks.scan [--addresses N] [--rounds N] [--all]
 
-Nobody answers while the time is taken, as that is what a search spends its time on. The limit of
-an address is its request, the longest turnaround of the profiles or the silence that ends the
-request, and the first character of a reply. --all takes two minutes.
+No drive answers while the time is taken, as a scan spends its time on empty addresses. The limit of
+an address is its request, the longest turnaround of the profiles or the gap that ends the request,
+and the first character of a reply. --all takes two minutes.
 """
 
 from __future__ import annotations
@@ -33,9 +33,9 @@ from tui.simulator import LineTiming
 
 FACTORY = LineSetting(19200, "8E1")
 ELSEWHERE = 200
-"""Address of the one drive on a line on which nobody is asked."""
+"""Address of the only drive, on a line where it is not scanned."""
 AIM_ONE, AIM_ALL = 5.0, 60.0
-"""Seconds in which 31 addresses are to be asked at one setting, and at all."""
+"""Seconds in which 31 addresses should be scanned at one setting, and at all."""
 IN_COMMAND = (4, 17, 31)
 """Addresses of the drives that the command finds."""
 
@@ -82,7 +82,7 @@ def one_setting(wire: WireLine, setting: LineSetting, addresses: Sequence[int]) 
 
 
 def all_settings(wire: WireLine, addresses: Sequence[int]) -> dict[str, Any]:
-    """Every setting in turn; the line is opened anew for each."""
+    """Every setting in turn; the line is reopened for each."""
     wire.set_up({ELSEWHERE: "atv71"}, LineTiming(FACTORY.baud, FACTORY.format, True))
     settings = settings_worth_a_try(FACTORY)
     opened = open_line(wire.text, wait=5.0)

@@ -1,4 +1,4 @@
-"""What sharing a line costs: a request, a stop and the load of programs that attach to its owner.
+"""Cost of sharing a line: a request, a stop and the load of programs attached to its owner.
 
     python -m benchmarks.share [--requests N] [--stops N] [--seconds S]
 

@@ -1,13 +1,13 @@
-"""Programs that share a line, stall and are killed: wrong values, writes repeated, what is left.
+"""Programs that share a line, stall and are killed: wrong values, repeated writes, leftovers.
 
     python -m benchmarks.share_soak [--minutes N] [--seed N] [--late SHARE] [--twice SHARE]
 
 Some programs share the faulty line of `truth`: each reads registers that hold a value of their own,
-writes words that nobody else writes, reads them back, and now and then stops a drive, which voids
-what the others meant for it. All the while one after another is frozen for up to four seconds, told
-to end, or killed; every third kill hits the owner of the line while it writes. A new one comes for
-each that went. Wrong are a value that is another's, a word read back that was not written, and a
-write that reached the line twice.
+writes words that no other program writes, reads them back, and occasionally stops a drive, which
+cancels pending writes of the others. In turn, each is frozen for up to 4 s, terminated, or killed;
+every third kill hits the owner of the line while it writes. Each one that ended is replaced. Wrong
+are a value that is another's, a word read back that was not written, and a write that reached the
+line twice.
 """
 
 from __future__ import annotations
@@ -55,7 +55,8 @@ AGES = (0.0, 0.0, 0.2)
 """Greatest ages in s that the reads accept."""
 FAULTS = Faults(late=0.02, lost=0.01, duplicated=0.0, corrupted=0.02, noise=0.01)
 """No reply comes twice unless asked for: of the first copy on a line RTU gives no means to tell
-that it is one (see `truth`). Whoever takes the line over is told of those before."""
+that it is one (see `truth`). The next owner gets the earlier ones.
+"""
 TIMING = replace(FAST, late_reply=Timing().late_reply, frame_gap=Timing().frame_gap)
 """Quick, but for what comes late because the computer is busy with all these programs."""
 FROZEN = (0.1, 4.0)
@@ -69,12 +70,12 @@ CODE = "from benchmarks.share_soak import program; program()"
 
 
 def place_in(folder: str, path: str) -> SharePlace:
-    """Where the programs meet."""
+    """Folder in which the programs meet."""
     return SharePlace(path, Path(folder) / "lines", (Path(folder) / "run",))
 
 
 def program() -> None:
-    """Do what the first line of the input tells until the input ends; a count each second."""
+    """Do what the first input line says until the input ends; print a count each second."""
     reported = json.loads(sys.stdin.readline())
     asyncio.run(_Guest(reported["path"], reported["folder"], reported["number"]).run())
 
@@ -169,12 +170,12 @@ def _address_of(device: int, word: int) -> int:
     return ((word - value_of(device, 0)) * pow(value_of(0, 1), -1, 1 << 16)) & 0xFFFF
 
 
-# Whoever strikes them
+# The source of the blows
 
 
 @dataclass(slots=True)
 class _Guests:
-    """The programs that are there, and what those that went have told."""
+    """The running programs, and the reports of those that ended."""
 
     path: str
     folder: str
@@ -218,7 +219,7 @@ class _Guests:
             process.wait(20)
 
     def owner(self) -> subprocess.Popen[str] | None:
-        """The one that owns the line."""
+        """The owner of the line."""
         found = owner_of(place_in(self.folder, self.path))
         return next(
             (process for process in self.there if found and process.pid == found.program.pid), None
@@ -226,7 +227,7 @@ class _Guests:
 
 
 def strike(guests: _Guests, chance: random.Random, done: Counter[str]) -> None:
-    """One blow, and somebody new for whom it ended."""
+    """One blow, and a replacement for a program that it ended."""
     drawn = chance.random()
     if drawn < 0.55:
         frozen = chance.choice(guests.there)
@@ -243,7 +244,7 @@ def strike(guests: _Guests, chance: random.Random, done: Counter[str]) -> None:
 
 
 def soak(minutes: float, seed: int, faults: Faults = FAULTS) -> dict[str, object]:
-    """The soak; what it came to."""
+    """Run the soak and return its result."""
     chance, done = random.Random(seed), Counter[str]()
     faulty = FaultyLine(Setting(seed, faults, turnaround=0.002))
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""The panel's side of a line for a long time: wrong values, recoveries, memory.
+"""The panel's side of a line over a long time: wrong values, recoveries, memory.
 
     python -m benchmarks.soak [--minutes N] [--peer] [--seed N]
 
@@ -56,16 +56,16 @@ IMPATIENT = 0.25
 """Share of these that are given up after at most `GIVEN_UP` seconds."""
 GIVEN_UP = 0.1
 KEPT = 50
-"""Wrong values that are told in full."""
+"""Wrong values that are printed in full."""
 BEFORE, AFTER = 2.5, 0.05
-"""Seconds before and after a wrong value of which the frames are told."""
+"""Seconds before and after a wrong value for which frames are printed."""
 SAMPLES = 9
 """Least number of looks at the memory; else one a minute."""
 
 
 @dataclass(slots=True)
 class Tally:
-    """What came of one line; counts, and times in s."""
+    """Result of one line; counts, and times in s."""
 
     good: int = 0
     wrong: int = 0
@@ -157,7 +157,7 @@ class Watched:
                 )
 
     def _frames(self, time: float) -> list[str]:
-        """What passed on the line before a reply that ended at this time."""
+        """Frames on the line before a reply that ended at this time."""
         return [
             f"{frame.time - time:+.4f} {frame.direction} {frame.data.hex()} {frame.note}".strip()
             for frame in self.line.trace
@@ -210,7 +210,7 @@ class Watched:
 
 @dataclass(frozen=True, slots=True)
 class Sample:
-    """What this process held at a time in s since the start; memory in bytes."""
+    """Resources of this process at a time in s since the start; memory in bytes."""
 
     second: float
     memory: int | None
@@ -219,7 +219,7 @@ class Sample:
 
 
 def sample(began: float) -> Sample:
-    """What this process holds now; None where the system does not tell it."""
+    """Current resources of this process; None if the system does not report them."""
     memory = handles = None
     with suppress(OSError):
         pages = int(Path("/proc/self/statm").read_text().split()[1])
@@ -240,7 +240,7 @@ def growth(samples: Sequence[Sample]) -> float | None:
 
 @contextmanager
 def peers(wanted: bool, seed: int, prepared: Prepared) -> Iterator[list[soak_peers.Served]]:
-    """The lines that are asked; raises MissingPeer."""
+    """The lines to poll; raises MissingPeer."""
     with ExitStack() as stack:
         if not wanted:
             yield [stack.enter_context(soak_peers.simulated(seed))]
@@ -252,7 +252,7 @@ def peers(wanted: bool, seed: int, prepared: Prepared) -> Iterator[list[soak_pee
 
 
 async def soak(lines: Sequence[Watched], seconds: float) -> list[Sample]:
-    """Let it run for so long; looks at the memory meanwhile."""
+    """Run for this time and sample the memory."""
     operators = [asyncio.create_task(watched.operate()) for watched in lines]
     began = time.monotonic()
     samples = [sample(began)]

@@ -52,7 +52,7 @@ def prepare(
     specs = [DriveSpec(family, device, sets=wanted[device]) for device, family in FAMILIES.items()]
     simulation = Simulation(specs, timing=timing, faults=faults, seed=seed)
     for drive in simulation.drives:
-        drive.step(1.0)  # what the drive overwrites by itself has shown itself by then
+        drive.step(1.0)  # by then, values that the drive overwrites are known
     kept = {
         device: {c: raw for c, raw in own.items() if simulation.drive(device).raw(c) == raw}
         for device, own in wanted.items()

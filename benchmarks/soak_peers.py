@@ -1,6 +1,6 @@
-"""What the soak asks: a faulty simulated line, or a libmodbus server that answers late.
+"""Peers of the soak: a faulty simulated line, or a libmodbus server that answers late.
 
-All of it runs in processes of its own, so that the memory of the soak is that of the panel's side.
+They run in separate processes, so that the memory of the soak is that of the panel's side.
 """
 
 from __future__ import annotations
@@ -57,7 +57,7 @@ class Served:
     text: str
     devices: tuple[int, ...]
     made: dict[str, int]
-    """How often each fault was made; filled at the end."""
+    """Count of each fault; filled at the end."""
 
 
 # The simulated line
@@ -196,5 +196,5 @@ def cable() -> None:
 
 
 def fault_report() -> dict[str, object]:
-    """What the peers were set to do wrong."""
+    """Faults that the peers are set to produce."""
     return {"simulated": asdict(FAULTS), "libmodbus": {"every": EVERY, "longest_s": LONGEST}}

@@ -2,17 +2,17 @@
 
     python -m benchmarks.stop [--presses N] [--drives N]
 
-The panel runs in a pseudo-terminal of 80 x 24 with its Monitor screen open, polls all drives of
-a real-time line of 19200 baud as fast as the line allows, and uploads the parameters of one of
-them in the background. F12 is pressed at odd moments; the simulated line, a process of its own,
-notes when the last byte of each stop frame has passed. The limit is the longest exchange of that
-load, which may be in flight, with the silence behind it, and the stop frame itself.
+The panel runs in a pseudo-terminal of 80 x 24 with its Monitor screen open, polls all drives of a
+real-time line of 19200 baud as fast as the line allows, and uploads the parameters of one of them
+in the background. F12 is pressed at odd moments; the simulated line, a process of its own, notes
+when the last byte of each stop frame has passed. The limit is the longest exchange of that load,
+which may be in flight, with the silence behind it, and the stop frame itself.
 
-Once more with a terminal that nobody reads, so that the screen is stuck; and then, to compare,
-with the same key handled as Textual does it by itself, in the loop that draws.
+Then again with a terminal that is not read, so that the screen is stuck; and, for comparison, with
+the key handled by Textual, in the drawing loop.
 
-Last, a stop of all drives of the same line: from the call to the last byte of the last frame of
-the first wave, as a ratio to so many exchanges of a stop frame one behind the other.
+Last, a stop of all drives of the same line: from the call to the last byte of the last frame of the
+first wave, as a ratio to so many exchanges of a stop frame one behind the other.
 """
 
 from __future__ import annotations
@@ -56,11 +56,11 @@ KEY = b"\x1b[24~"
 """F12 as terminals send it."""
 WATCHED = 1
 READY = b"Command"
-"""What Monitor says of a drive once its first values are there."""
+"""Text of Monitor once the first values of a drive are shown."""
 PATIENCE = 60.0
 SETTLING = 4.0
 STUCK_AFTER = 3.0
-"""Seconds of full redraws after which a terminal that is not read takes nothing more."""
+"""Seconds of full redraws after which an unread terminal accepts no more output."""
 WITHIN = 4.0
 """Seconds in which a stop frame counts for its key."""
 ALL_PRESSES = 5
@@ -134,7 +134,7 @@ CASES = (
 
 
 class Terminal:
-    """The panel's terminal: read by a thread, or by nobody."""
+    """The panel's terminal, read by a thread or not at all."""
 
     def __init__(self, process: int, fd: int) -> None:
         self.process, self.fd = process, fd
@@ -236,7 +236,7 @@ def measure(line: WireLine, drives: dict[int, str], case: Case, presses: int) ->
 def result_of(
     line: WireLine, case: Case, pressed: Sequence[float], exchanges: Sequence[Exchange]
 ) -> Result:
-    """What the line saw of the keys that were pressed."""
+    """Record of the line for the keys pressed."""
     character = line.times.character
     stops = [
         exchange.began + len(exchange.request) * character
@@ -258,7 +258,7 @@ def result_of(
 
 
 def is_stop(exchange: Exchange) -> bool:
-    """Whether an exchange is a write of the watched drive's command word."""
+    """Return True if an exchange writes the command word of the watched drive."""
     request = exchange.request
     register = int.from_bytes(request[2:4], "big")
     return request[1] == 6 and (request[0], register) in COMMANDS

@@ -51,11 +51,11 @@ Figures = dict[str, Any]
 
 
 class NotShown(Exception):
-    """What was waited for did not come to the terminal."""
+    """The expected output did not reach the terminal."""
 
 
 class Picture:
-    """What a terminal shows: as much of its language as the programs here speak, no colors."""
+    """Picture of a terminal: the part of its language that these programs use, no colors."""
 
     def __init__(self, columns: int, rows: int) -> None:
         self._columns, self._rows = columns, rows
@@ -64,7 +64,7 @@ class Picture:
         self._decode = codecs.getincrementaldecoder("utf-8")("replace").decode
         self._rest = ""
         self.answers: list[str] = []
-        """What a terminal owes the program: its cursor's place, for each question."""
+        """Reply that a terminal owes the program: the cursor position, for each request."""
 
     def feed(self, data: bytes) -> None:
         """Take what the program wrote; a sequence may come in pieces."""
@@ -149,7 +149,7 @@ class Picture:
 
 @dataclass(frozen=True, slots=True)
 class Usage:
-    """What a process has used: CPU time in s, memory that it holds in bytes."""
+    """Resources used by a process: CPU time in s, memory in bytes."""
 
     cpu: float
     memory: int
@@ -226,7 +226,7 @@ class Terminal:
         self.written += len(data)
         self.picture.feed(data)
         while self.picture.answers:
-            with suppress(OSError):  # the program may have ended meanwhile
+            with suppress(OSError):  # the program may have ended since
                 os.write(self._terminal, self.picture.answers.pop(0).encode())
         return come
 
@@ -251,7 +251,7 @@ class Terminal:
                 seen(self.picture.text())
 
     def usage(self) -> Usage | None:
-        """What the program has used so far; None where the system does not tell it."""
+        """Resources used by the program so far; None if the system does not report them."""
         place = Path(f"/proc/{self.process}")
         if not place.exists():
             return None
@@ -270,13 +270,13 @@ class Terminal:
 
 @dataclass(frozen=True, slots=True)
 class Key:
-    """A key that changes the picture at once, and the signs in its text that all change then."""
+    """A key that changes the picture immediately, and the characters of its text that change."""
 
     key: str
     signs: Callable[[str], tuple[object, ...]]
 
     def changed(self, before: tuple[object, ...], text: str) -> bool:
-        """Whether every sign is another one than before, or gone; empty ones count for nothing."""
+        """Return True if every character has changed or disappeared; blanks do not count."""
         now = self.signs(text)
         if not before or not now:
             return False
@@ -286,7 +286,7 @@ class Key:
 def steady(
     terminal: Terminal, seconds: float, seen: Callable[[str], None] | None = None
 ) -> Figures:
-    """Bytes, CPU and memory of a program that nobody touches."""
+    """Bytes, CPU and memory of a program without input."""
     before, written, start = terminal.usage(), terminal.written, time.monotonic()
     terminal.run(seconds, seen)
     after, took = terminal.usage(), time.monotonic() - start
@@ -315,7 +315,7 @@ def press_often(terminal: Terminal, key: Key, presses: int) -> Figures:
 
 
 def spread(times: Sequence[float]) -> Figures:
-    """Median, 95th and 99th percentile and worst of times in s, told in ms."""
+    """Median, 95th and 99th percentile and worst of times in s, formatted in ms."""
     found = {"median": median(times) if times else None, "worst": max(times, default=None)}
     found |= {"95": share(times, 0.95), "99": share(times, 0.99)}
     return {f"{name}_ms": None if value is None else value * 1e3 for name, value in found.items()}

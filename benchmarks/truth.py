@@ -1,15 +1,15 @@
-"""Wrong values delivered on a line that lies: 0 is the only good figure.
+"""Wrong values delivered on a faulty line: only 0 is acceptable.
 
     python -m benchmarks.truth [--full] [--processes N]
 
-Every register holds a value of its own, so a value that is another's is seen. The line makes
-its replies late, lost, double, short, corrupt, behind noise, another drive's, of another
-function or length, by a seeded plan. Some requests are cancelled on their way. What is written
+Every register holds a value of its own, so a value that is another's is seen. By a seeded plan,
+replies of the line are late, lost, duplicated, truncated, corrupt, preceded by noise, from another
+drive, or of another function or length. Some requests are cancelled on their way. What is written
 is read back. Contestants get the same plans; those whose waits are long do fewer exchanges.
 
 To make hundreds of thousands of exchanges in minutes the line has no baud rate and the waits are
-short (timeout 50 ms, replies up to 120 ms late); one row is measured with the panel's usual
-times on a paced line of 19200 baud, where replies come up to 1.2 s late.
+short (timeout 50 ms, replies up to 120 ms late); one row is measured with the panel's usual times
+on a paced line of 19200 baud, where replies come up to 1.2 s late.
 """
 
 from __future__ import annotations
@@ -73,7 +73,7 @@ ALIKE = (3202, 2)
 
 @dataclass(slots=True)
 class Tally:
-    """What a contestant met; times in s."""
+    """Results of a contestant; times in s."""
 
     name: str
     exchanges: int = 0
@@ -88,7 +88,7 @@ class Tally:
     _failing_since: float | None = None
 
     def note(self, answer: Sequence[int] | None, right: Sequence[int]) -> None:
-        """Count one exchange; no answer is an error that was told."""
+        """Count one exchange; a missing reply is a reported error."""
         self.exchanges += 1
         if answer is None:
             self.errors += 1
@@ -136,7 +136,7 @@ def plan(seed: int, count: int) -> list[tuple[int, int, int]]:
 
 
 def right(device: int, address: int, words: int) -> list[int]:
-    """What these registers hold."""
+    """Values of these registers."""
     return [value_of(device, at) for at in range(address, address + words)]
 
 

@@ -1,11 +1,10 @@
-"""A whole drive read out for a backup: time on the line, over what the line allows.
+"""All parameters of a drive read for a backup: time on the line, compared with its limit.
 
     python -m benchmarks.upload [--baud BAUD] [--rounds N]
 
-The limit of the plan is the time of the cheapest requests for all readable parameters; beside
-it stands the least time of one request a parameter, which is what most tools do. Drives refuse
-what they do not have, and then each word is asked for alone: that is in the time, not in the
-limit.
+The limit of the plan is the time of the cheapest requests for all readable parameters; the other
+figure is the least time with one request per parameter, as most tools do. Drives refuse missing
+parameters, and then each word is requested separately. That is part of the time, not of the limit.
 """
 
 from __future__ import annotations

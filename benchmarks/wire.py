@@ -1,6 +1,6 @@
-"""A simulated line in a process of its own that records every exchange, and what follows from it.
+"""A simulated line in its own process that records every exchange, and figures from it.
 
-As a program it serves one simulated line at a time, told by lines of JSON on its input.
+As a program it serves one simulated line at a time, controlled by JSON lines on its input.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ class Recording:
 
 @dataclass(frozen=True, slots=True)
 class WireTimes:
-    """What the line and its drives take; all in s, turnarounds by address."""
+    """Delays of the line and its drives; all in s, turnarounds by address."""
 
     character: float
     silence: float
@@ -83,8 +83,9 @@ class WireTimes:
         return exchange.began + characters * self.character + wait
 
     def shortest(self, exchange: Exchange) -> float:
-        """Least time from a request to the next one: the silence before a reply is part of
-        the drive's turnaround, the one before the next request is not."""
+        """Least time from a request to the next: the gap before a reply is part of the drive's
+        turnaround, the gap before the next request is not.
+        """
         return self.reply_end(exchange) - exchange.began + self.silence
 
     def read(self, device: int, words: int) -> float:
@@ -94,7 +95,7 @@ class WireTimes:
 
 @dataclass(slots=True)
 class Record:
-    """What a line saw of one contestant, with the ends of its cycles where it has told them."""
+    """Record of the line for one contestant, with the ends of its cycles if reported."""
 
     times: WireTimes
     exchanges: list[Exchange]
@@ -128,7 +129,7 @@ class Record:
         return [b.began - a.ended for a, b in pairwise(self.exchanges) if a.size]
 
     def lateness(self) -> list[float]:
-        """How much later than due the simulator itself ended each reply, in s."""
+        """Delay of each reply of the simulator beyond its due time, in s."""
         return [e.ended - self.times.reply_end(e) for e in self.exchanges if e.size]
 
     def least(self) -> float:
@@ -192,7 +193,7 @@ class WireLine:
         self.times = WireTimes(0.0, 0.0, {})
 
     def set_up(self, profiles: Mapping[int, str], timing: LineTiming) -> None:
-        """Serve drives of these profiles, by address, in place of those served so far."""
+        """Serve drives of these profiles, by address, instead of those served so far."""
         drives = list(profiles.items())
         reported = self._worker.ask(
             do="serve", drives=drives, baud=timing.baud, format=timing.format

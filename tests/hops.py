@@ -39,7 +39,7 @@ class Trail:
     shown: str
     """The value as text, such as 231.7."""
     edges: dict[tuple[str, str], str] = field(default_factory=dict)
-    """By the module that had the value and the one that got it: the type that carried it."""
+    """Type of the carrier, by the module that had the value and the one that got it."""
     _given: dict[int, str] = field(default_factory=dict)
 
     @contextmanager
@@ -116,7 +116,7 @@ class Trail:
 
 
 def members(value: Any) -> Iterator[Any]:
-    """What a container or a record holds; nothing of what works by itself, such as a monitor."""
+    """Content of a container or a record; nothing that runs independently, such as a monitor."""
     kind = type(value)
     if isinstance(value, Mapping):
         yield from list(value.values())[:LONGEST]

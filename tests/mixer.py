@@ -1,7 +1,7 @@
 """An invented drive whose reference each test defines: its profile as text, and installed.
 
 Status 100, output frequency 101, command 200, reference REF 201, key switch 202, scale source MODE
-203, what 100 % is FULL 204, limits LOW 205 and HIGH 206, motor plate 207 and 208.
+203, value of 100 % FULL 204, limits LOW 205 and HIGH 206, motor plate 207 and 208.
 """
 
 from __future__ import annotations

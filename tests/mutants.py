@@ -309,7 +309,7 @@ def _listed(defects: Iterable[Defect]) -> int:
 
 
 def main() -> int:
-    """Plant what was asked for; 1 where something survives."""
+    """Plant the selected defects; return 1 if one survives."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
     parser.add_argument("names", nargs="*", metavar="NAME", help="only these defects, or tests")
     parser.add_argument("--list", action="store_true", help="name the defects, plant nothing")

@@ -142,7 +142,7 @@ class Defaults:
 
 @dataclass(slots=True)
 class _Surroundings:
-    """Where the walk through a module is."""
+    """Position of the walk through a module."""
 
     function: str = ""
     in_function: bool = False
@@ -182,7 +182,7 @@ class Mutator:
 
     def _mutant(self, change: Change, node: ast.AST, around: _Surroundings) -> Mutant:
         old = self._source[change.start : change.end].decode()
-        # same text, same change, same function: told apart by their number
+        # same text, same change, same function: distinguished by their number
         alike = f"{around.function}: {_reads(change, old)}"
         self._seen[alike] += 1
         lines: tuple[range, ...] = ()

@@ -115,7 +115,7 @@ def stop_path() -> set[tuple[str, str]]:
 
 
 class Uses:
-    """Where names of modules are used: what runs at import has its effect there."""
+    """Modules that use names of a module: code that runs at import has its effect there."""
 
     @cached_property
     def _importers(self) -> dict[str, set[Path]]:

@@ -1,8 +1,8 @@
-"""Which lines of the product each test reaches, recorded by coverage.py.
+"""Lines of the product that each test reaches, recorded by coverage.py.
 
-As a pytest plugin (`-p tests.reached`) it records one process; `record` has all tests recorded in
-a copy of the checkout, and keeps the result in a cache folder of the user's, one for a commit.
-Code that runs in a process of its own, such as a keeper, is not recorded.
+As a pytest plugin (`-p tests.reached`) it records one process; `record` has all tests recorded in a
+copy of the checkout, and keeps the result in a cache folder of the user's, one for a commit. Code
+that runs in a process of its own, such as a keeper, is not recorded.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ PYTEST = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.reached",
 
 
 class Reach(NamedTuple):
-    """What is known of one test."""
+    """Record of one test."""
 
     lines: int
     """Lines of the product that it reaches: the fewer, the more it is about each."""
@@ -50,7 +50,7 @@ def folder() -> Path:
 
 
 def git(*arguments: str) -> str:
-    """What git prints in the checkout; raises OSError or CalledProcessError without one."""
+    """Output of git in the checkout; raises OSError or CalledProcessError without one."""
     command = ("git", "-C", str(ROOT), *arguments)
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout
 
@@ -95,7 +95,7 @@ class Recorder:
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Record in each process that runs tests, and not in the one that deals them out."""
+    """Record in each process that runs tests, and not in the one that distributes them."""
     parts = os.environ.get(PARTS)
     is_dealer = getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput")
     if parts and not is_dealer:
@@ -141,7 +141,7 @@ def _load(path: Path) -> dict[str, list[Any]]:
 
 
 def _lines_by_test(whole: Path) -> dict[str, int]:
-    """How many lines each test reaches, by the tables that coverage.py documents."""
+    """Count the lines that each test reaches, by the tables that coverage.py documents."""
     with sqlite3.connect(whole) as tables:
         tables.create_function("ones", 1, lambda bits: int.from_bytes(bits, "big").bit_count())
         return dict(
@@ -181,7 +181,7 @@ class Record:
 
 @cache
 def _moved(commit: str) -> dict[str, str]:
-    """Where files were at a commit that have another path today."""
+    """Earlier paths of files whose path has changed since a commit."""
     status = git("diff", "--name-status", "--diff-filter=R", "-M50%", commit, "--", "tui", "tests")
     rows = (line.split("\t") for line in status.splitlines())
     return {new: old for _, old, new in rows}
@@ -198,7 +198,7 @@ def renamed(commit: str, name: str) -> str:
 
 @cache
 def _renamed_in(commit: str, file: str) -> tuple[str, dict[str, str]]:
-    """Where a file of tests of a commit is today, and tests of it that have another name."""
+    """Current path of a test file of a commit, and its renamed tests."""
     now = next((new for new, old in _moved(commit).items() if old == file), file)
     if not (ROOT / now).exists():
         return now, {}

@@ -190,7 +190,7 @@ def test_panel_is_shown_before_line_modules_are_imported() -> None:
         "        await pilot.pause()\n"
         "        assert app.connection.query_one('#lines').option_count\n"
         "        assert gc.isenabled() and gc.get_freeze_count()\n"
-        "        await pilot.press('space', 'f12', 'f9')\n"  # the stop keys work all the same
+        "        await pilot.press('space', 'f12', 'f9')\n"  # the stop keys still work
         "asyncio.run(first_picture())\n"
         "print(*sys.modules)\n"
         "ours = [m for n, m in list(sys.modules.items()) if n.startswith('tui.')]\n"

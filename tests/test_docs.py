@@ -134,7 +134,7 @@ def _fault_of_path(span: str) -> str:
     path = span.rstrip("/").replace("NAME", "*")
     top = path.partition("/")[0]
     if "/" in path and not (ROOT / top).is_dir():
-        return ""  # a place in somebody's own folders, or on the line
+        return ""  # a path in a user's folders, or on the line
     folders = [ROOT / tree for tree in (*TREES, "docs", "profiles")] if "/" not in path else []
     if not any((*ROOT.glob(path), *(found for folder in folders for found in folder.rglob(path)))):
         return "not there"

@@ -1,4 +1,4 @@
-"""What a class with a lock changes, it changes under the lock; no thread keeps a program alive.
+"""A class with a lock changes its state under the lock only; no thread keeps a program alive.
 
 A test of behavior would notice a missing lock once in thousands of runs, and such a thread only if
 its disk or its port hangs.
@@ -20,7 +20,7 @@ CHANGES = {
 }  # fmt: skip
 """Methods of collections that change them."""
 ROOMS = ("bus", "keeper", "session")
-"""Where threads meet: that of the line, those of drives, that of the screen."""
+"""Classes used by several threads: that of the line, those of drives, that of the screen."""
 
 OBJECTS = {"events", "journal", "_file", "_files", "_trace"}
 """Not collections although they have such methods: logs with their own locks, files, frames."""

@@ -61,7 +61,7 @@ READY, RUNNING = 0x0231, 0x0637
 
 
 class Now:
-    """A clock that stands still until a test moves it; stands for the module `time`, too."""
+    """A clock that advances only by the test; also replaces the module `time`."""
 
     def __init__(self) -> None:
         self.seconds = 1000.0

@@ -210,7 +210,7 @@ class PtyPeer(Peer):
         with self._lock:
             if self._master >= 0:
                 if self._thread is not None and self._thread is not threading.current_thread():
-                    # the thread leaves the descriptor first, so that its number is not used anew
+                    # the thread leaves the descriptor first, so that its number is not reused
                     self._stop.set()
                     self._thread.join()
                 if self._link.is_symlink() and self._link.readlink() == self._device:

@@ -1,8 +1,8 @@
 """A program on a shared line that takes commands on standard input, until it is killed.
 
 `python -m tests.bus.share_program PORT FOLDER NAME LATE`; prints `ready`, then a line for each
-command: `read REGISTER`, `ask REGISTER`, `write REGISTER VALUE`, `claim DEVICE`. It does not
-wait for the answer of `ask`, nor for the end of a write.
+command: `read REGISTER`, `ask REGISTER`, `write REGISTER VALUE`, `claim DEVICE`. It waits neither
+for the reply to `ask` nor for the end of a write.
 """
 
 from __future__ import annotations

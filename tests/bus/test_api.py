@@ -1,4 +1,4 @@
-"""What a `ModbusLine` promises, asked of the line of live drives and of the fake alike."""
+"""Contract of a `ModbusLine`, for the line of live drives and for the fake."""
 
 from __future__ import annotations
 
@@ -186,7 +186,7 @@ async def test_describe_limits_the_requests_to_a_device(end: Open) -> None:
     with pytest.raises(RequestRefused):
         await made.line.write(THERE, 100, [0x10000])
     with pytest.raises(RequestRefused):
-        await made.line.read(3, 100, 2)  # nobody described it
+        await made.line.read(3, 100, 2)  # it has no description
 
 
 async def test_forbidden_request_is_not_sent_at_last_moment(end: Open) -> None:
@@ -286,7 +286,7 @@ async def test_closing_the_line_ends_pending_requests(end: Open) -> None:
         made.line.spawn(work, "work")
 
 
-# What the fake can be told
+# Settings of the fake
 
 
 @pytest.fixture

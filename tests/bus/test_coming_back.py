@@ -1,4 +1,4 @@
-"""How long a new holder waits for programs to come back, by a clock that is the test's."""
+"""Wait of a new holder for programs to reconnect, by the clock of the test."""
 
 from __future__ import annotations
 

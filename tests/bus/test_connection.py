@@ -1,4 +1,4 @@
-"""A line that is not there yet, goes away, comes back, or is somebody else's."""
+"""A line that is missing, lost, recovered, or used by another program."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a line counts of each of its devices."""
+"""Counts of each device on a line."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ async def test_each_device_has_its_own_counts(open_line: OpenLine) -> None:
             with suppress(ExchangeError):
                 await line.read(device, address, priority=Priority.OPERATOR_READ)
         counters, other = line.counters.devices[1], line.counters.devices[2]
-        # the damaged one and the silent one were asked twice
+        # the damaged and the unanswered request were sent twice
         assert (counters.requests, counters.replies, counters.repeats) == (6, 2, 2)
         assert (counters.checksum, counters.timeouts, counters.exceptions) == (2, 2, {2: 1})
         assert counters.bytes_out == 6 * READ_SIZE

@@ -1,4 +1,4 @@
-"""Adapters that repeat what is sent, told from drives that answer by repeating the request."""
+"""Adapters that echo requests, distinguished from drives whose reply repeats the request."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ async def test_line_works_with_and_without_echo(
         assert (await line.read(1, 9, 4)).words == (9, 10, 11, 12)
         assert line.counters.timeouts == line.counters.wrong == line.counters.checksum == 0
         assert any(frame.note == "echo" for frame in line.trace) is echo
-        # what was asked only to tell an echo from an answer is counted as well
+        # requests that only detect an echo are counted too
         answered = line.counters.requests - (first == "broadcast")
         assert line.counters.replies == answered
 

@@ -112,7 +112,7 @@ async def test_cancelled_request_in_the_queue_is_not_sent(open_line: OpenLine) -
 
 
 def instead(pdu: bytes, device: int = 1) -> Script:
-    """Answer with this whatever was asked."""
+    """Answer every request with this."""
     return lambda _request, _count: [frame(device, pdu)]
 
 
@@ -294,7 +294,7 @@ async def test_gap_that_ends_a_reply_counts_from_its_last_bytes(
 async def test_reply_with_a_pause_is_awaited_for_its_time_on_the_wire(
     open_line: OpenLine,
 ) -> None:
-    """A busy computer hands a reply over in parts; the drive was asked again while it talked."""
+    """A busy computer delivers a reply in parts; the drive was requested again while it replied."""
 
     def in_halves(request: bytes, _: int) -> Sequence[Step]:
         whole = reply(request)
@@ -321,7 +321,7 @@ async def test_scanned_empty_address_is_not_counted_as_a_failure(
         with pytest.raises(NoAnswer):
             await line.read(2, 5, priority=priority)
         assert (line.counters.searched, line.counters.timeouts) == (1, 0)
-        # a device that is there, or that somebody asked for, failed
+        # a known device, or one that an operator requested, failed
         await line.read(3, 5, priority=priority)
         with pytest.raises(NoAnswer):
             await line.read(3, 6, priority=priority)
@@ -451,7 +451,7 @@ def _pauses(peer: PtyPeer) -> list[float]:
 async def test_reply_that_began_before_the_end_of_its_request_is_rejected(
     open_line: OpenLine, wire_time: bool | None, taken: int
 ) -> None:
-    """Where bytes take their time; a pseudo-terminal without a line's times may be that quick."""
+    """Applies if bytes have a wire time; a pseudo-terminal without one may be that fast."""
 
     def at_last_one_of_another(request: bytes, count: int) -> Sequence[Step]:
         return [frame(1, b"\x03\x02\x00\x4d")] * (count == 9) + [0.1, reply(request)]

@@ -104,7 +104,7 @@ async def _answer(reader: asyncio.StreamReader) -> tuple[int, int, bytes]:
 
 
 async def test_queued_requests_get_replies_with_their_own_transaction_ids() -> None:
-    """The first answer is awaited for long; the second request comes in meanwhile."""
+    """The first reply takes long; the second request arrives in that time."""
     free = asyncio.Event()
 
     async def answer(request: TcpRequest) -> bytes:
@@ -171,7 +171,7 @@ async def test_urgent_write_overtakes_earlier_writes() -> None:
 
 
 async def test_queued_reads_do_not_delay_a_write_in_the_socket() -> None:
-    """Further ones are told to come again: a stop may be behind them."""
+    """Further requests are refused with busy: a stop may follow them."""
     free = asyncio.Event()
 
     async def answer(request: TcpRequest) -> bytes:
@@ -270,7 +270,7 @@ async def test_waiting_client_does_not_block_other_clients() -> None:
 async def test_idle_client_makes_room_for_another(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Programs that forgot 64 connections kept the one out that came to stop a motor."""
+    """Programs that forgot 64 connections kept out the one that was to stop a motor."""
     monkeypatch.setattr(server, "MOST_CLIENTS", 3)
     gone: list[str] = []
 
@@ -283,7 +283,7 @@ async def test_idle_client_makes_room_for_another(
     place = await gateway.listen("127.0.0.1", 0)
     clients = [await asyncio.open_connection(*place) for _ in range(3)]
     for number, (reader, writer) in enumerate(clients, 1):
-        # the first waits for its answer: it is not idle, however long ago it asked
+        # the first waits for its reply: it is not idle, however long that takes
         await _requested(writer, number, number, bytes([3, 0, 0, 0, 1]))
         if number > 1:
             await _answer(reader)
@@ -335,7 +335,7 @@ async def test_connections_of_other_hosts_do_not_keep_a_client_out(
 async def test_connections_waiting_for_writes_do_not_keep_a_client_out(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """64 connections of one host did, and the next one came to stop a motor."""
+    """64 connections of one host did, and the next one was to stop a motor."""
     monkeypatch.setattr(server, "MOST_CLIENTS", 2)
     monkeypatch.setattr(server, "MOST_LEAVING", 2)
     done: list[int] = []

@@ -1,4 +1,4 @@
-"""Other ends that never stop, or answer what was not asked yet."""
+"""Peers that never stop sending, or reply before a request."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ QUESTION = bytes([3, 0, 5, 0, 1])
 
 
 class CommandBlocked:
-    """A transport with bytes that came in and that nobody has fetched from the system yet."""
+    """A transport with received bytes that are still in the system."""
 
     note = ""
 
@@ -104,13 +104,13 @@ async def test_bytes_received_while_suspended_in_sending_are_not_a_reply() -> No
     assert result.kind is ResultKind.NOTHING
     await master.quiet()
     assert [piece.whole for piece in strays] == [True]
-    # sent all the same, which a write has to know
+    # sent anyway, which a write must know
     assert len(transport.sent) == 1
     master.close()
 
 
 async def test_bytes_before_a_request_with_a_guessed_transaction_are_not_a_reply() -> None:
-    """The transaction ids of a client count up: whoever wants to can tell the next one."""
+    """Transaction ids of a client increase, so anyone can guess the next one."""
     transport = CommandBlocked(tcp_reply(bytes([0, 1, 0, 0, 0, 6, 1]) + QUESTION))
     around = context([])
     master = TcpMaster(transport, around, lambda: None)
@@ -154,7 +154,7 @@ async def test_take_in_reads_pending_bytes_of_a_connection() -> None:
             transport.start(taker)
             await asyncio.sleep(0.01)
             other.sendall(b"early")
-            time.sleep(0.05)  # noqa: ASYNC251 - the loop must not look meanwhile
+            time.sleep(0.05)  # noqa: ASYNC251 - the loop must not run in this time
             await transport.take_in()
             assert taker.data == b"early"
             transport.close()

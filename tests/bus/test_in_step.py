@@ -332,7 +332,7 @@ def test_buffering_connection_is_probed_every_ten_seconds(buffers: bool, longer:
 
 
 class _Line:
-    """A drive's replies without a wire; the clock stands still."""
+    """Replies of a drive without a wire; the clock does not advance."""
 
     def __init__(self, *, gateway: bool = False) -> None:
         self.now = 1.0

@@ -172,7 +172,7 @@ def test_timeout_is_clamped_to_its_bounds(timeout: float) -> None:
 
 
 def reads(peer: PtyPeer) -> int:
-    """How often the register of the reads was read."""
+    """Count the reads of the keep-alive register."""
     return sum(
         request[1] == 3 and int.from_bytes(request[2:4], "big") == ADDRESS
         for request in peer.requests
@@ -223,7 +223,7 @@ async def test_next_holder_keeps_devices_of_attached_programs_alive_only(share: 
 
 
 def _holds(line: Line) -> Callable[[], bool]:
-    """Whether a program holds the line alone, and keeps nothing alive."""
+    """True if one program holds the line alone, and keeps nothing alive."""
     facts = line.facts
     return lambda: facts.programs == (facts.me,) and not facts.keep_alives.kept
 

@@ -23,7 +23,7 @@ from .peer import PtyPeer, honest
 from .sharing import QUICK, SharedLines, place_in
 
 QUIET = 6.0
-"""Seconds in which a reply may still come to the keeper before."""
+"""Seconds in which a reply to the previous keeper may still arrive."""
 
 
 def keeper_line(

@@ -1,6 +1,6 @@
-"""Nothing is written to a device that its program has not armed, by what the line's holder knows.
+"""A device is written only if its program has armed it, as the line's holder knows.
 
-The programs here do not check it themselves, as one that hangs or is wrong does not.
+The programs in these tests do not check it, like one that hangs or is wrong.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ async def test_stop_ends_the_lease_of_every_program(share: Share) -> None:
         await program.write(1, 1, [RUN])
         holder.facts.give_stop([1], "the stop key")
         await asyncio.to_thread(eventually, lambda: program.facts.stops.stamp(1) == 1)
-        # it knows the stop, and believes that its drive is armed all the same
+        # it knows the stop, and believes that its drive is still armed
         assert await refusal(program) == "Not sent: drive 1 was stopped after it was armed."
         program.facts.leases.arm(1, 60.0, CARE)
         await program.write(1, 1, [RUN])

@@ -1,4 +1,4 @@
-"""Who gets the line's time when more is asked than it carries; by a clock of the test's own."""
+"""Shares of the line's time under overload; by the clock of the test."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class TimedLine:
         self.away: set[int] = set()
         """Devices that answer nothing."""
         self.round_trip = False
-        """Whether programs ask again during the next exchange only."""
+        """True if programs send again during the next exchange only."""
         self.last_moment: Callable[[], None] = lambda: None
         """Called when a request is about to be sent."""
         self._later: list[Submitted] = []
@@ -73,7 +73,7 @@ class TimedLine:
             raise LineLost("the time is up")
 
     async def exchange(self, sending: Sending) -> ExchangeResult:
-        """Answer, and ask again for what was asked."""
+        """Answer, and repeat the request."""
         self.last_moment()
         sending.look()
         self.now += EXCHANGE

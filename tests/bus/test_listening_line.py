@@ -24,7 +24,7 @@ ME = Program("1", "listen", os.getpid())
 
 
 class Talk:
-    """A pseudo-terminal at whose other end somebody talks."""
+    """A pseudo-terminal with traffic from its other end."""
 
     def __init__(self) -> None:
         self.ours, self.theirs = pty.openpty()

@@ -46,7 +46,7 @@ class Ended:
             self.reply(device, ResultKind.REPLY)
 
     def doubted(self, device: int) -> None:
-        """A reply that is asked for once more, as it may be a copy of the one before."""
+        """A reply that is requested again, as it may be a copy of the previous one."""
         self._outcomes.count_beside(device, ExchangeResult(ResultKind.REPLY, end=self.now))
 
     def missed(self, device: int, times: int = 1, priority: Priority = Priority.POLL) -> None:
@@ -55,7 +55,7 @@ class Ended:
             self.reply(device, ResultKind.NOTHING, priority)
 
     def heard(self, data: bytes) -> None:
-        """A whole frame comes that answers no request of now."""
+        """A whole frame arrives that answers no current request."""
         self._outcomes.note_stray(Piece(data, whole=True), self.now)
 
     @property
@@ -164,7 +164,7 @@ def test_scan_does_not_count(ended: Ended) -> None:
 def test_frames_of_another_master_are_foreign(ended: Ended) -> None:
     ended.good(1)
     ended.heard(frame(1, bytes.fromhex("0300640002")))  # asks a drive of ours
-    ended.heard(frame(8, bytes.fromhex("030400010002")))  # a drive that nobody here asks
+    ended.heard(frame(8, bytes.fromhex("030400010002")))  # a drive that no program here polls
     assert (ended.line.foreign, ended.line.strays) == (2, 0)
     assert 8 not in ended.tally.devices
 

@@ -1,4 +1,4 @@
-"""What becomes of a request once its exchange is over; no line, no time of its own."""
+"""Outcome of a request at the end of its exchange; without a line or a clock."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from tui.bus.tally import Tally
 def test_read_is_repeated_if_its_reply_waited_not_if_it_is_long(
     turnaround: float, on_wire: float, lay: float, anew: bool
 ) -> None:
-    """A backup at 1200 baud asked for its first long answer again and again, without an end."""
+    """A backup at 1200 baud requested its first long reply again and again, without an end."""
     timing, end = Timing(), turnaround + on_wire
     devices, tally = Devices(timing, mistakable=True), Tally()
     outcomes = Outcomes(devices, tally, timing, lambda: end + lay, SharedState(), gateway=False)

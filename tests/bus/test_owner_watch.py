@@ -1,4 +1,4 @@
-"""Whether a keeper hangs, as a program on its line sees it, and what ends it then."""
+"""Detection of a hung keeper by a program on its line, and its end."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def test_keeper_that_ignores_the_greeting_of_a_stop_is_killed_after_2_s(
 
 
 def test_program_that_was_suspended_kills_no_keeper(bench: Bench) -> None:
-    """What the keeper has said meanwhile is yet to be read."""
+    """Messages of the keeper are waiting to be read."""
     bench.watch.note_stop()
     bench.wait(60.0, awake=False)
     bench.wait(STOP_HEARD_WITHIN - 0.1)
@@ -234,7 +234,7 @@ def test_keeper_in_another_container_is_named_as_such(
     found = KeeperProcess(elsewhere, connection)
     assert not found.kill()
     assert found.remedy == OTHER_CONTAINER
-    # its lock file does not tell, but the system: no process here has its number
+    # the system shows it, not the lock file: no process here has its number
     monkeypatch.setattr("tui.bus.share.owner_watch.peer_of", lambda _: Peer(0, os.getuid()))
     assert KeeperProcess(owner(process.pid), connection).remedy == OTHER_CONTAINER
     assert process.poll() is None

@@ -1,4 +1,4 @@
-"""A stop in its plain form: who may give it, whom it stops, and forms that are none."""
+"""A stop in its plain form: who may send it, which drives it stops, and invalid forms."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ async def test_plain_stop_reaches_every_program_as_from_an_unattached_one(
         # no program carries it out, so the owner does
         assert due == [((3, 4), f"stop (pid {os.getpid()})")]
         for line in (owner, other):
-            # what was meant before is void, whoever meant it
+            # pending writes of every program are cancelled
             assert "a stop came after it" in line.facts.refusal(line.facts.me.id, 3, before[line])
             assert not line.facts.refusal(line.facts.me.id, 5, line.facts.stops.stamp(5))
         await voided_and_stopped(lines, peer, other, owner)

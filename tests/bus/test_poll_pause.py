@@ -1,4 +1,4 @@
-"""A device that is left alone: only what belongs to a stop goes out to it."""
+"""A device whose polling is paused: only requests of a stop are sent to it."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ async def test_paused_device_is_sent_stops_only(open_line: OpenLine) -> None:
 
 @pytest.mark.parametrize("stopper", ["panel", "prove", "watch"])
 async def test_stop_ends_the_pause_of_polling(share: Share, stopper: str) -> None:
-    """Whoever stops it looks at it until it stands, and does not wait for who leaves it alone."""
+    """A stop follows the device to standstill, and does not wait for the program that paused it."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         programs = {name: lines.open(name) for name in ("panel", "prove", "watch")}

@@ -77,7 +77,7 @@ class Subscriber:
         return self.turns[:count]
 
     def end(self) -> None:
-        """Want no more cycles."""
+        """Accept no more cycles."""
         assert self.subscription is not None
         in_loop(self._line, self.subscription.end)
 
@@ -89,7 +89,7 @@ def taken(turn: PolledTurn, *wanted: PlannedRead) -> list[tuple[int, ...]]:
 
 
 def served(owner: Line) -> Any:
-    """What the owner of a line carries out."""
+    """Plans that the owner of a line carries out."""
     shared = cast(Any, owner._engine._shared)
     return shared._server._polls
 
@@ -230,7 +230,7 @@ async def test_polling_pauses_while_the_subscriber_reads_nothing(
 
 
 class FullWriter:
-    """A connection whose other end takes nothing."""
+    """A connection whose other end reads nothing."""
 
     def __init__(self, unread: int) -> None:
         assert unread < MOST_UNREAD
@@ -239,7 +239,7 @@ class FullWriter:
         )
 
     def write(self, data: bytes) -> None:
-        """Take it to nobody."""
+        """Discard it."""
 
 
 async def test_commands_and_stops_are_sent_between_requests_of_a_cycle(share: Share) -> None:
@@ -252,7 +252,7 @@ async def test_commands_and_stops_are_sent_between_requests_of_a_cycle(share: Sh
         await watch.write(1, 30, [1])
         await owner.write(1, 40, [0], priority=Priority.STOP)
         order = polled(peer)
-        # each behind one exchange in flight at most, and the one that its writer saw begin
+        # each after one exchange in flight at most, and the one that its writer saw begin
         assert order.index(40) - order.index(30) <= 2
         assert len(order) < len(many)
         (turn,) = await asyncio.to_thread(subscriber.await_turns, 1)
@@ -264,7 +264,7 @@ async def test_plan_beyond_the_limits_of_its_device_is_refused(share: Share) -> 
         lines = share(peer.path)
         lines.open("keeper")
         watch = lines.open("watch")
-        # a device that nobody described takes one word
+        # a device without a description accepts one word
         wanted = plan(reads(100), reads(200, count=2), device=77)
         subscriber = Subscriber(watch, wanted)
         eventually(lambda: subscriber.error is not None)
@@ -326,7 +326,7 @@ async def test_refused_plan_has_its_reason_over_the_socket(share: Share) -> None
 
 
 def refused_plan(lines: SharedLines) -> PolledReply:
-    """What a program is refused that asks for two words of a device that it has not described."""
+    """Refusal of a program that requests two words of a device without a description."""
     with raw(lines) as stranger:
         stranger.sendall(hello())
         stranger.sendall(packed(Subscribe(5, plan(reads(100, count=2)))))
@@ -353,7 +353,7 @@ async def test_cycle_that_does_not_match_its_plan_ends_the_connection(message: P
     assert device.heard is None
     plans.hear(Polled(1, 0, 5.0, (PolledReply(b"\x03\x02\0\1", 5.0),)))
     assert device.heard == 5.0
-    plans.hear(Polled(2, 0, 5.0, ()))  # one that has ended
+    plans.hear(Polled(2, 0, 5.0, ()))  # a program that has exited
 
 
 async def test_next_owner_takes_the_plan_over(share: Share) -> None:

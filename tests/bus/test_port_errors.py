@@ -1,4 +1,4 @@
-"""What a port counts of broken characters, and that the line tells what was added."""
+"""Error counts of a port, and their increase as reported by the line."""
 
 from __future__ import annotations
 

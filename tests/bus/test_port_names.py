@@ -35,7 +35,7 @@ def test_adapters_with_the_same_by_id_name_are_distinguished(adapters: Adapters)
     two = lasting_name(adapters.plug("ttyUSB1", "1.2"))
     assert name.path != two.path
     shared = adapters.links / "by-id" / "usb-FTDI_6001-if00-port0"
-    # typed by the name that both have, it is known as the one that it leads to now
+    # typed by the shared name, it is the adapter that the name leads to
     assert lasting_name(str(shared)) == two
 
 

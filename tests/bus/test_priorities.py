@@ -1,4 +1,4 @@
-"""Who goes first, and how little one silent drive costs the others."""
+"""Order of requests, and the small cost of one silent drive for the others."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ async def test_write_forbidden_while_it_waits_is_not_sent(
         with pytest.raises(RequestRefused, match=r"^A stop came\.$"):
             await waiting
         await before
-        # the next one is asked anew
+        # the next one is requested again
         why[0] = ""
         await line.write(1, 99, [8], forbidden=lambda: why[0])
         assert [request[1] for request in peer.requests] == [3, 6]
@@ -119,7 +119,7 @@ async def test_stop_is_repeated_although_its_reply_may_be_late(
         with pytest.raises(NoAnswer):
             await line.write(1, 99, [0], priority=Priority.STOP)
         await line.write(1, 99, [0], priority=Priority.STOP)
-        # several words: a late answer to the first could not be told from that to the second
+        # several words: a late reply to the first could be taken for that to the second
         peer.script = silent
         with pytest.raises(NoAnswer):
             await line.write(1, 99, [0, 0], priority=Priority.STOP)

@@ -171,7 +171,7 @@ def test_known_drive_is_polled_without_a_pause_until_three_misses(
 
 
 def test_dead_drive_takes_no_more_time_than_with_a_pause_after_each_miss() -> None:
-    """A minute of polls, as often as they are let through."""
+    """A minute of polls, as often as they are allowed."""
     timing = Timing()
     devices = Devices(timing, mistakable=True)
     devices.answered(1, EXPECTED, 0.01, 0.0)
@@ -455,7 +455,7 @@ def test_new_owner_knows_late_and_repeated_replies() -> None:
     assert owner.stray(reply, 11.4)
     heir.copy(1, owner.state(1))
     assert heir.state(1) == owner.state(1)
-    # the copy of a reply to the heir's first request is not taken for that to its second
+    # the copy of a reply to the first request of the next owner is not taken for that to its second
     heir.answered(1, expectation, 0.005, 12.0)
     assert heir.not_before(1, expectation, Priority.POLL, 12.1) == pytest.approx(12.8)
     # and the line is left quiet for one that is late, as the owner would leave it

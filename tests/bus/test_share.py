@@ -180,11 +180,11 @@ async def test_value_is_reused_if_a_program_accepts_its_age(
         # words of two replies are never one answer: they may be of two moments
         await other.read(1, 10, 4, max_age=60)
         assert len(peer.requests) == 6
-        # a write makes them old, whoever writes
+        # a write of any program makes them old
         await owner.write(1, 99, [1])
         await other.read(1, 11, 2, max_age=60)
         assert len(peer.requests) == 8
-        # also one that is not answered
+        # also an unanswered one
         with pytest.raises(NoAnswer):
             await other.write(1, UNANSWERED, [1])
         await owner.read(1, 11, 2, max_age=60, priority=Priority.OPERATOR_READ)

@@ -135,7 +135,7 @@ def test_stop_count_raised_by_others_is_corrected_by_its_program() -> None:
     before = owner.stamp(1)
     assert owner.learn_greeting("run", {1: {"run": 3}}, ["panel", "liar", "run"]) == (1,)
     assert owner.stamp(1) == before
-    # while it is there, nobody else counts for it
+    # while it is attached, no other program counts for it
     assert owner.learn_greeting("liar", {1: {"run": 2000, "panel": 9}}, ["panel", "run"]) == ()
     assert owner.note("run", (1,), (4,), "the stop key") == (1,)
     assert owner.stamp(1) == before + 1
@@ -156,7 +156,7 @@ def test_stop_counts_by_name_stay_few() -> None:
 
 
 async def voided_and_stopped(lines: SharedLines, peer: PtyPeer, stopper: Line, other: Line) -> None:
-    """A stop by one program voids the other's write of before, and its frame is sent."""
+    """A stop by one program cancels an earlier write of the other, and its frame is sent."""
     device = 3
     eventually(lambda: stopper.facts.stops.stamp(device) == other.facts.stops.stamp(device))
     heard: list[tuple[int, ...]] = []
@@ -389,7 +389,7 @@ async def test_client_with_mutated_messages_of_its_owner_continues_and_stops(
             for item in server._all():
                 item.writer.write(data)
 
-        # one that lies about the end of a request is believed
+        # a false report of the end of a request is believed
         lies = (b"Answer", b"Failed")
         found = [mutant for mutant in mutants() if not any(kind in mutant[:20] for kind in lies)]
         for some in batches(chance.sample(found, 500), 10):

@@ -1,4 +1,4 @@
-"""What becomes of the others when a program on the line ends, is killed, or talks nonsense."""
+"""Programs on a line when another one ends, is killed, or sends garbage."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ async def test_owner_that_closes_hands_the_line_over_and_reads_are_repeated(
         assert (await in_flight).words == (SLOW_REGISTER,)
         for task in waiting:
             assert (await task).words == (30,)
-        # the same read may have been the first on the port, which tells of its adapter
+        # the same read may have been the first on the port, which identifies its adapter
         assert times_sent(peer, 3) in (2, 3)
         eventually(lambda: {line.facts.programs[0].name for line in (other, third)} != {"panel"})
         assert other.facts.programs[0] == third.facts.programs[0]
@@ -135,7 +135,7 @@ async def test_next_owner_waits_for_replies_to_a_killed_owner(share: Share, tmp_
         await come(lambda: times_sent(peer, 6) == 1)
         killed = await asyncio.to_thread(owner.kill)
         assert (await line.read(1, 8)).words == (8,)
-        # the reply to the write may come for a second; what it was is not asked for again
+        # the reply to the write may arrive for a second; the write is not repeated
         assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
         assert peer.arrivals[-1] - killed < 2.0
         assert times_sent(peer, 6) == 1
@@ -173,7 +173,7 @@ async def test_program_that_opens_after_a_killed_owner_waits_for_late_replies(
 
 
 async def test_program_that_opens_after_a_closed_owner_waits_for_late_replies(share: Share) -> None:
-    """Whoever was not attached was not told."""
+    """Programs that were not attached got no notice."""
     late = replace(QUICK, late_reply=1.0)
     with PtyPeer(slow_at_77) as peer:
         lines = share(peer.path)
@@ -182,7 +182,7 @@ async def test_program_that_opens_after_a_closed_owner_waits_for_late_replies(sh
         write = asyncio.create_task(owner.write(1, SLOW_REGISTER, [1]))
         await asyncio.to_thread(peer.await_requests, 2)
         await asyncio.to_thread(owner.close)
-        # one that ends before it has sent anything hands it on
+        # a program that ends before it has sent anything passes it on
         lines.open("hasty", timing=late, wait=None)
         await asyncio.sleep(0.1)
         lines.opened[-1].close()
@@ -220,7 +220,7 @@ async def test_next_owner_reports_programs_that_exited_with_the_owner(
         assert sorted(gone) == ["panel", "run"]
 
 
-# Clients that are no good
+# Faulty clients
 
 
 def raw(lines: SharedLines) -> socket.socket:
@@ -243,7 +243,7 @@ def answer(connection: socket.socket) -> AnyMessage:
 
 
 def answer_of_kind(connection: socket.socket, kind: type[M]) -> M:
-    """The next message of a kind, whatever is told besides."""
+    """Next message of a kind; others are skipped."""
     while not isinstance(reported := answer(connection), kind):
         pass
     return reported
@@ -378,7 +378,7 @@ async def test_unreachable_owner_is_named_immediately(
 async def test_client_disconnects_from_an_owner_that_sends_garbage(
     share: Share, tmp_path: Path
 ) -> None:
-    """What takes connections on the socket, and is no program of ours, must not hang the others."""
+    """A foreign program that accepts connections on the socket must not hang the others."""
     lock = OwnerLock(place_in(tmp_path))
     assert lock.take()
     path = tmp_path / "odd.sock"
@@ -402,7 +402,7 @@ async def test_client_disconnects_from_an_owner_that_sends_garbage(
 
 
 def held() -> tuple[int, int]:
-    """How many files and threads this process has."""
+    """Number of files and threads of this process."""
     return len(os.listdir("/proc/self/fd")), threading.active_count()
 
 

@@ -1,4 +1,4 @@
-"""Programs on a line that are frozen, not gone: what they held is free, what they meant is void."""
+"""Frozen programs on a line: their drives are free, their pending writes cancelled."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ async def test_frozen_client_counts_as_gone_and_loses_its_drives(
         with frozen(other):
             run = asyncio.create_task(other.write(1, 1, [RUN]))
             await come(lambda: gone == ["run"])
-            # whoever wants the drive gets it, and is not disturbed
+            # another program gets the drive, and is not disturbed
             await come(lambda: third.facts.commander(1) is None)
             assert third.facts.claim(1) == ""
             await third.write(1, 1, [OTHER])
@@ -75,7 +75,7 @@ async def test_owner_that_was_suspended_keeps_its_clients(share: Share) -> None:
         with frozen(other):
             with frozen(owner):
                 await asyncio.sleep(2.6)
-            # it has looked for a sign of life twice by now
+            # by now it has checked the heartbeat twice
             await asyncio.sleep(0.5)
         await other.read(1, 5)
         await asyncio.sleep(0.5)

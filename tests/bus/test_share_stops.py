@@ -1,4 +1,4 @@
-"""Stops by any program: before everything else, and what they void stays void everywhere."""
+"""Stops by any program: they precede everything, and cancel pending writes everywhere."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ async def send_stop(line: Line, device: int) -> float:
 
 
 def stop(line: Line, *devices: int) -> list[asyncio.Task[float]]:
-    """What a stop key does: nothing that was meant before goes out, and the stop goes first."""
+    """A stop key: earlier writes are cancelled, and the stop is sent first."""
     line.facts.give_stop(devices, "the stop key")
     return [asyncio.create_task(look_and_stop(line, device)) for device in devices]
 
@@ -85,7 +85,7 @@ async def test_stop_discards_pending_work_for_its_drive_only(
             assert "a stop came after it (the stop key" in await refused(task)
         await asyncio.gather(reading, *stops, *others)
         assert written(peer) == [(1, STOP), (2, RUN), (2, RUN), (2, RUN)]
-        # what is meant afterwards goes out
+        # later writes are sent
         eventually(lambda: all(program.facts.stops.stamp(1) == 1 for program in programs))
         for program in programs:
             await program.write(1, 1, [RUN])
@@ -194,7 +194,7 @@ def test_stop_counts_only_increase_and_count_a_message_once() -> None:
     assert other.learn(counts.given) == (1, 2)
     assert other.learn(counts.given) == ()
     assert (other.stamp(1), other.stamp(2), other.stamp(0)) == (2, 1, 3)
-    # what the owner tells replaces all but the own count
+    # counts from the owner replace all but the own count
     assert counts.replace(other.given, "a") == (1,)
     counts.give("a", (1,), "key")
     assert counts.replace(other.given, "a") == ()
@@ -211,13 +211,13 @@ def test_stop_counts_only_increase_and_count_a_message_once() -> None:
 async def test_stop_waits_for_a_frozen_owner_and_cancels_earlier_writes(
     share: Share,
 ) -> None:
-    """The owner goes on with commands in its queue, and in its sockets, that a stop has voided."""
+    """The owner resumes with commands in its queue and sockets that a stop has cancelled."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other, third = (lines.open(name) for name in ("run", "stop", "remote"))
         await owner.read(1, 1)
         with frozen(owner):
-            # by the owner itself, and by one that does not know of the stop
+            # by the owner, and by a program that does not know of the stop
             runs = [
                 asyncio.create_task(owner.write(1, 1, [RUN])),
                 asyncio.create_task(third.write(1, 1, [RUN])),
@@ -233,7 +233,7 @@ async def test_stop_waits_for_a_frozen_owner_and_cancels_earlier_writes(
             assert written(peer) == []
         for run in runs:
             assert "Not sent" in await refused(run)
-        # it goes out by itself, once
+        # it is sent automatically, once
         eventually(lambda: written(peer) == [(1, STOP)])
         await owner.write(2, 1, [RUN])
         assert written(peer) == [(1, STOP), (2, RUN)]
@@ -354,7 +354,7 @@ async def test_program_that_was_suspended_does_not_report_a_frozen_owner(share: 
 async def test_reply_delayed_by_a_suspended_program_is_requested_again(
     share: Share,
 ) -> None:
-    """Nobody can tell when it came: its time would be that of the program's going on."""
+    """Its time of arrival is unknown: it would be the time when the program resumed."""
     brisk = replace(QUICK, first_timeout=0.3, min_timeout=0.3)
     with PtyPeer(slow) as peer:
         line = share(peer.path).open("panel", timing=brisk)
@@ -367,7 +367,7 @@ async def test_reply_delayed_by_a_suspended_program_is_requested_again(
 
 
 async def test_late_client_gets_the_time_of_a_stop(share: Share) -> None:
-    """A command that was typed before the stop, and comes to the line after it, must know."""
+    """A command typed before the stop, but sent to the line after it, must know of it."""
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         panel = lines.open("panel")
@@ -376,7 +376,7 @@ async def test_late_client_gets_the_time_of_a_stop(share: Share) -> None:
         late = lines.open("run")
         assert before < late.facts.stops.times[1] < time.monotonic()
         assert late.facts.stops.times == panel.facts.stops.times
-        # an owner that has ended tells it to the next one, whoever that is
+        # an owner that exits passes it to the next one
         late.close()
         panel.close()
         next_owner = lines.open("next")
@@ -406,6 +406,6 @@ def test_stop_time_in_the_future_is_ignored() -> None:
     assert counts.late_times == counts.times
     counts.learn_times({4: time.monotonic() - STOPS_KEPT - 1})
     assert 4 not in counts.late_times
-    # a stop that is told again was given when it was given
+    # a repeated stop message keeps the time of the stop
     counts.note("a", (1,), (1,), "the stop key")
     assert counts.times[1] == given

@@ -62,7 +62,7 @@ async def test_values_return_once_the_drive_has_echoed_a_number(
         # the reply to the killed one comes first, and has the form of the one to this read
         assert (await line.read(1, OTHER)).words == (OTHER,)
         assert time.monotonic() - killed < 1.0
-        # the read between tells whether the adapter repeats what is sent
+        # the read between shows if the adapter echoes
         assert functions(peer) == [3, 3, 3, 8, 3]
         await line.read(1, OTHER)
         assert functions(peer) == [3, 3, 3, 8, 3, 3], "once is enough"
@@ -95,7 +95,7 @@ async def test_stop_words_do_not_wait_for_the_proof(share: Share, tmp_path: Path
 
 
 def busy_once(request: bytes, count: int) -> Sequence[Step]:
-    """A drive that hears everything meanwhile, and answers it in turn."""
+    """A drive that receives all requests and answers them in order."""
     return [0.55 if count == 0 else 0.03, reply(request)]
 
 

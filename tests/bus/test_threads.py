@@ -124,7 +124,7 @@ def test_worker_runs_while_the_loop_of_the_caller_hangs(open_line: OpenLine) -> 
         worker = line.spawn(poll, "poll")
 
         async def frozen() -> None:
-            # the whole loop stands still, as a screen's does before a stalled terminal
+            # the whole loop hangs, like that of a screen at a stalled terminal
             eventually(lambda: len(seen) > 5)
 
         asyncio.run(frozen())

@@ -36,7 +36,7 @@ def run(status: int, *arguments: str | Path) -> str:
 
 
 def refused(status: int, *arguments: str | Path) -> str:
-    """What `block` says on standard error; faults of an assignment stand before the refusal."""
+    """Standard error of `block`; errors of an assignment come before the refusal."""
     output = commands.ended(status, "block", *arguments).stderr
     assert "drivepanel: " in output
     return output
@@ -129,7 +129,7 @@ def test_running_motor_keeps_its_assignment() -> None:
 def test_write_cut_by_signal_is_reported_by_slot(
     line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Nothing was told of the slots that were written by then."""
+    """Slots written by then were not reported."""
     came = nullcontext([signal.SIGTERM])
     monkeypatch.setattr("tui.cli.shared.signals.cancelled_by_signal", lambda _: came)
     fail_write(monkeypatch, "NMA4", asyncio.CancelledError())

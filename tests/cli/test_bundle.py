@@ -28,7 +28,7 @@ posix = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here"
 
 
 def bundled(file: Path, *words: str) -> tuple[dict[str, Any], dict[str, bytes]]:
-    """What a bundle is reported as, and its files by their names without the folder."""
+    """JSON of a bundle, and its files by their names without the folder."""
     report: dict[str, Any] = json.loads(
         run(0, "bundle", *words, "--output", str(file), "--force", "--json")
     )

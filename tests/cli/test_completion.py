@@ -1,4 +1,4 @@
-"""What a shell completes: commands, options, lines, profiles, codes."""
+"""Shell completion: commands, options, lines, profiles, codes."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def test_codes_are_completed() -> None:
     assert completed("read sim:atv71@2,atv312 -d 2 RFRD") == ["RFRD"]
     assert completed("write sim:atv312 AC") == ["ACC=", "AC2="]
     assert "rFr=" not in completed("write sim:atv312 rF")
-    assert completed("read /dev/ttyUSB0 AC") == []  # nobody is asked who is there
+    assert completed("read /dev/ttyUSB0 AC") == []  # no drive is identified
     assert completed("read sim:nosuch AC") == []
 
 

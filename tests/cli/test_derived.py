@@ -1,4 +1,4 @@
-"""What is made from the registrations of commands is as it is committed."""
+"""Files derived from the registrations of commands are as committed."""
 
 from __future__ import annotations
 

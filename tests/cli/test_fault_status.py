@@ -1,4 +1,4 @@
-"""`status` on a drive in fault: what it points at, with the values of now, in text and JSON."""
+"""`status` on a drive in fault: causes and checks with current values, in text and JSON."""
 
 from __future__ import annotations
 

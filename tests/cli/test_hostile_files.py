@@ -1,4 +1,4 @@
-"""Files that are none, never end, or are nested without end: each is told in a sentence."""
+"""Invalid files, endless ones, or endlessly nested ones: each is reported in a sentence."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ FILES: dict[str, tuple[Callable[[Path], None], str]] = {
 
 @pytest.fixture(params=FILES)
 def odd(request: pytest.FixtureRequest, tmp_path: Path) -> tuple[Path, str]:
-    """A file, and what is told of it."""
+    """A file, and the text reported about it."""
     make, reported = FILES[request.param]
     path = tmp_path / "odd.toml"
     make(path)

@@ -1,4 +1,4 @@
-"""What `--json` prints: the shape that scripts rely on, and nothing beside it."""
+"""Output of `--json`: the form that scripts rely on, and nothing else."""
 
 from __future__ import annotations
 

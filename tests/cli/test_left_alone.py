@@ -1,4 +1,4 @@
-"""What every command says at its end of a communication timeout that it leaves running."""
+"""Warning of every command at its end about a communication timeout that it leaves running."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ def test_timeout_that_starts_with_a_command_is_reported_after_one() -> None:
         done = ended(0, "read", line, "ETA", "--json")
         assert done.stderr == ""
         assert json.loads(done.stdout)["timeout"]["begun"] is False
-        put(line, CMD, 6)  # by somebody else
+        put(line, CMD, 6)  # by another master
         done = ended(0, "read", line, "ETA", "--json")
         assert "timeout TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
         assert json.loads(done.stdout)["timeout"]["begun"] is True
@@ -250,7 +250,7 @@ def test_hold_without_a_drive_exits_with_3() -> None:
 
 
 def test_hold_keeps_a_drive_alive_while_it_scans() -> None:
-    """An address at which nobody answers takes seconds."""
+    """An address without a drive takes seconds."""
     with tcp_line("atv21@1", "--set", "F803=2") as line:
         silent = [word for device in range(10, 14) for word in ("-d", str(device))]
         hold = (*DRIVEPANEL, "hold", line, "-d", "1", *silent)

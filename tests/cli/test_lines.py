@@ -32,7 +32,7 @@ ACC = 9001
 
 @pytest.fixture
 def line() -> Iterator[str]:
-    """A line with two drives, one of which does not say who it is."""
+    """A line with two drives, one of which does not identify itself."""
     with tcp_line("atv71@1", "powerdrive@5") as found:
         yield found
 
@@ -278,7 +278,7 @@ def test_stop_reads_no_file(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def completed(typed: str) -> list[str]:
-    """What a shell offers for a line whose last word has begun."""
+    """Completions for a line whose last word has begun."""
     *words, incomplete = typed.split(" ")
     found = ShellComplete(main, {}, "drivepanel", "_X").get_completions(words, incomplete)
     return [item.value for item in found]

@@ -206,7 +206,7 @@ def test_unanswered_and_refused_requests_are_reported() -> None:
 
 
 def test_text_from_the_wire_does_not_control_terminal() -> None:
-    """A drive whose name is an escape sequence, asked who it is by another master."""
+    """A drive whose name is an escape sequence, identified by another master."""
     spec = DriveSpec("atv71", 2, identity={6: "\x1b[2J\x07"})
     with Simulation([spec]) as simulation:
         master = PlcOnLine(simulation, [bytes.fromhex("022b0e0100")])

@@ -1,4 +1,4 @@
-"""What ends up in the log file: everything that any module of the panel logs."""
+"""Content of the log file: everything that any module of the panel logs."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def test_failed_task_leaves_its_traceback_in_the_log() -> None:
 
 
 def test_every_module_logs_by_its_own_name() -> None:
-    """The handler hangs above all of them; a logger of any other name is heard by nobody."""
+    """The handler covers all of them; a logger of any other name is not logged."""
     named: dict[str, list[str]] = {}
     for path, call in calls_of("getLogger"):
         name = path.relative_to(PACKAGE).as_posix()
         named.setdefault(name, []).extend(ast.unparse(each) for each in call.args)
-    # the one that hangs the handler, and the one that silences pymodbus
+    # the module that adds the handler, and the one that silences pymodbus
     assert named.pop("session/logs.py") == ["PANEL", "PANEL"]
     assert named["bus/line.py"] == ["'pymodbus'", "'pymodbus'"]
     del named["bus/line.py"]
@@ -59,7 +59,7 @@ def test_log_handler_covers_every_module() -> None:
 def test_hung_disk_does_not_block_logging() -> None:
     """A stop logs what it does: in the thread of the keys, and in that of the line."""
     log_file().parent.mkdir(parents=True, exist_ok=True)
-    os.mkfifo(log_file())  # to open it hangs until somebody reads it
+    os.mkfifo(log_file())  # opening it blocks until a program reads it
     start_logging(0)
     done = threading.Event()
 

@@ -1,4 +1,4 @@
-"""Lines and drives in the text format of Prometheus, and the server that tells them."""
+"""Lines and drives in the text format of Prometheus, and its server."""
 
 from __future__ import annotations
 
@@ -175,7 +175,7 @@ def test_every_unit_of_every_profile_has_a_metric_name() -> None:
 
 @pytest_asyncio.fixture
 async def served() -> AsyncIterator[int]:
-    """The port of a server that tells one metric."""
+    """Port of a server with one metric."""
     server = MetricsServer(lambda: "drivepanel_x 1\n")
     _, port = await server.listen("127.0.0.1", 0)
     yield port
@@ -188,7 +188,7 @@ async def requested(port: int, request: bytes) -> bytes:
     try:
         return await reader.read()
     except ConnectionResetError:
-        # it was let go with bytes of its request unread
+        # it was disconnected with unread bytes of its request
         return b""
     finally:
         writer.close()

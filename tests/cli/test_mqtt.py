@@ -1,4 +1,4 @@
-"""What goes to a broker: topics, messages, whose password, and what a lost connection costs."""
+"""Output to a broker: topics, messages, passwords, and the cost of a lost connection."""
 
 from __future__ import annotations
 
@@ -202,7 +202,7 @@ async def test_everything_is_retained_again_after_a_lost_connection(
     first = clients.made[2]
     assert first.how["will"] == aiomqtt.Will("plant/status", "offline", qos=1, retain=True)
     assert first.retained["plant/status"] == "online"
-    # a broker that sends what nobody asked for fills no terminal and no log
+    # unsolicited messages of a broker fill no terminal and no log
     assert not first.how["logger"].isEnabledFor(logging.ERROR)
     assert first.how["max_queued_incoming_messages"] == 1
 

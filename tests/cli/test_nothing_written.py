@@ -227,7 +227,7 @@ def test_scale_changed_during_the_start_exits_with_6() -> None:
 
 
 def test_run_checks_the_reference_before_taking_control() -> None:
-    """What the reference would be refused for is known before the terminals lose the motor."""
+    """Reasons to refuse the reference are known before the terminals lose control."""
     with counted("powerdrive") as served:
         done = drivepanel("run", served.line, *RUN[1:], "-p", "powerdrive", "--take-control")
         assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""What the command line hands to the panel, and how it ends with it."""
+"""Arguments that the command line passes to the panel, and the exit."""
 
 from __future__ import annotations
 

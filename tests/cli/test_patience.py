@@ -1,4 +1,4 @@
-"""What a command waits for on a line of 1200 baud that a panel uses too."""
+"""Wait of a command on a line of 1200 baud that a panel uses too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`drivepanel prove`: what it asks before a motor that turns is left alone, and of which port."""
+"""`drivepanel prove`: its question before a turning motor is not polled, and the port tested."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_timeout_of_each_port_is_tested() -> None:
     assert "15.07 is Off and 11.63 is Off. The drive does not react to a" in output
     with tcp_line("powerdrive@1", "--set", "11.63=5", "--any-settings") as line:
         reported = ended(1, "prove", line, "-p", "powerdrive", "--arm")
-    # the simulated drive is asked by its module, which has another timeout
+    # the simulated drive is polled through its module, which has another timeout
     assert "DID NOT REACT to 1.5 s without a request. It is set to 0.5 s" in reported.stdout
 
 

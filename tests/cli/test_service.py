@@ -1,4 +1,4 @@
-"""What systemd is told, over a datagram socket as it has one; and the unit in the repository."""
+"""Messages to systemd, over a datagram socket like its own; and the unit in the repository."""
 
 from __future__ import annotations
 

@@ -109,7 +109,7 @@ def test_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
 def test_restore_without_a_final_comparison_exits_with_3(
     line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """It told "1 written, 0 not" and status 4, as if the drive had refused something."""
+    """It reported "1 written, 0 not" and status 4, as if the drive had refused something."""
     file, looks = tmp_path / "set.toml", [plan_for]
     run(0, "backup", line, file, "-d", "2")
     run(0, "write", line, "ACC=9", "--arm", "-d", "2")

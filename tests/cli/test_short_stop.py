@@ -348,7 +348,7 @@ def test_short_stop_finds_the_holder_for_a_group(
         assert holder_address("/dev/null") == listening.getsockname()
         monkeypatch.setenv("DRIVEPANEL_SHARE_GROUP", "any")
         assert holder_address("/dev/null") == ""
-    # nobody has the lock of a group name a socket elsewhere
+    # no program can make the lock of a group name another socket
     place.lock_path.unlink()
     with held(place, "serial:/dev/null,19200,8E1", tmp_path):
         monkeypatch.delenv("DRIVEPANEL_SHARE_GROUP")

@@ -96,7 +96,7 @@ def test_refusal_by_the_drive_exits_with_4() -> None:
         assert done.returncode == 4
         assert "ACC" in done.stderr
         assert "exception 2" in done.stderr
-        # the drive answers, so watching it is no failure of the line
+        # the drive answers, so watching it is not a line failure
         watch = ("watch", line, "ETA", "ACC", "-d", "2", "--count", "1", "--json")
         assert drivepanel(*watch).returncode == 0
 

@@ -1,4 +1,4 @@
-"""`drivepanel status` over several lines: each is told by its name, none hides another."""
+"""`drivepanel status` over several lines: each is named, none hides another."""
 
 from __future__ import annotations
 

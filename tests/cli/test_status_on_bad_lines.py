@@ -75,7 +75,7 @@ def test_status_shows_known_values_if_a_setting_is_not_read(
 def test_status_does_not_list_a_shown_timeout_as_unread(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The drive told it as it was identified; every later read of it hangs."""
+    """The drive reported it at its identification; every later read of it hangs."""
     monkeypatch.setattr(drive_status, "STATUS_WITHIN", 2.0)
     with tcp_line("atv71@1") as line:
         lose(monkeypatch, TIMEOUT_WORD, 60.0, answered=2)

@@ -40,7 +40,7 @@ def test_drive_whose_polling_is_paused_is_stopped_too() -> None:
 
 
 async def stop_of(line: FakeLine, patience: Priority) -> str:
-    """What an address is stopped as."""
+    """Profile by which an address is stopped."""
     journal, telling = Journal(), StopTelling("fake", as_json=False)
     wish = StopWish(OpenLine("fake", line), None, "stop", journal, telling)
     found = await found_at(wish, 1, None, patience)

@@ -191,6 +191,6 @@ def test_each_run_command_selects_the_confirmed_preset(line: str, own_folders: P
 
 
 def journal(folders: Path) -> list[dict[str, Any]]:
-    """What was written so far."""
+    """Registers written so far."""
     text = (folders / "state" / "journal.jsonl").read_text("utf-8")
     return [json.loads(entry) for entry in text.splitlines()]

@@ -1,4 +1,4 @@
-"""What drives, files and people write, as the commands print it: text, with signs for controls."""
+"""Texts of drives, files and people as the commands print them: control characters are replaced."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SHOWN = "␛]0;x␇[red]␊␡"
 
 
 def tame(text: str) -> bool:
-    """Whether nothing in it commands a terminal but line feeds."""
+    """Return True if it has no control characters but line feeds."""
     return not any(commands(character) for character in text.replace("\n", ""))
 
 
@@ -47,7 +47,7 @@ def test_drive_name_does_not_control_terminal(line: str) -> None:
     assert f"Name       {SHOWN}\n" in printed
     text = run(0, "identify", line, "--json")
     assert tame(text)
-    # whoever takes it out of the JSON prints it on a terminal, too
+    # scripts print it from the JSON on a terminal, too
     assert json.loads(text)["name"] == SHOWN
 
 

@@ -1,4 +1,4 @@
-"""What a person types wrong, and where `-v` and `--json` may stand."""
+"""Typing errors, and the places where `-v` and `--json` are accepted."""
 
 from __future__ import annotations
 

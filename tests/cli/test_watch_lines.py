@@ -48,7 +48,7 @@ def objects(text: str) -> list[dict[str, Any]]:
 
 
 def sockets() -> list[str]:
-    """Sockets and notes of stops that lie in the state folder."""
+    """Sockets and notes of stops in the state folder."""
     state = Path(os.environ["DRIVEPANEL_STATE"])
     return [path.name for path in state.rglob("*.s*") if path.suffix in (".sock", ".stop")]
 
@@ -136,7 +136,7 @@ def test_lost_line_does_not_stop_others_and_ctrl_c_ends_all() -> None:
 
 
 def wished(*words: str) -> list[LineWish]:
-    """What `watch` is to watch."""
+    """Drives that `watch` is to watch."""
     context = watch.make_context("watch", list(words))
     with context:
         params = context.params
@@ -158,7 +158,7 @@ def drives(wishes: list[LineWish]) -> list[tuple[str, list[int], list[str | None
         (("pump",), [("pump", [1], [None])]),
         (("fan",), [("fan", [5], ["atv71"])]),
         (("pump", "fan"), [("pump", [1], [None]), ("fan", [5], ["atv71"])]),
-        # -d and -p go before what a name says; what stands at a LINE goes before -d
+        # -d and -p override a name; an address at a LINE overrides -d
         (("pump", "fan", "-d", "3"), [("pump", [3], [None]), ("fan", [3], [None])]),
         (("pump@1-2,7", "fan", "-d", "3"), [("pump", [1, 2, 7], 3 * [None]), ("fan", [3], [None])]),
         (("pump", "fan", "-p", "atv31"), [("pump", [1], ["atv31"]), ("fan", [5], ["atv31"])]),

@@ -1,4 +1,4 @@
-"""`drivepanel why`: its status, its sentence, its JSON; and that it leaves the drive as it was."""
+"""`drivepanel why`: its status, its sentence, its JSON; and that it leaves the drive unchanged."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ def test_pending_timeout_is_reported() -> None:
 
 @posix
 def test_why_works_beside_a_program_that_owns_the_line(tmp_path: Path) -> None:
-    """Its frames are told with a delay; it has the port, and that is no trouble."""
+    """Its frames arrive with a delay; it has the port, which is not a trouble."""
 
     def script(request: bytes, count: int) -> Sequence[bytes | float]:
         return honest(request, count) if request[0] == 1 else []

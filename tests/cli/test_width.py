@@ -1,4 +1,4 @@
-"""What is told on a terminal of few columns, and on one that wants no colors."""
+"""Output on a narrow terminal, and on one without colors."""
 
 from __future__ import annotations
 

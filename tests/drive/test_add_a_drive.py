@@ -70,7 +70,7 @@ def test_own_profile_replaces_a_packaged_one(folder: Path) -> None:
 
 
 BROKEN = [
-    # what is written, what it becomes, what the person is told
+    # old text, new text, expected message
     ('scale = "0.1"', 'scale = "a tenth"', "FREQ"),
     ("address = 101", "address = 100", "already belongs to STAT"),
     ('source = "guide 5.2"', 'source = "a book"', "does not begin with the id of a source"),

@@ -1,4 +1,4 @@
-"""Who commands and who gives the reference, by all channel parameters of a family."""
+"""Command and reference sources by all channel parameters of a family."""
 
 from __future__ import annotations
 

@@ -272,5 +272,5 @@ def test_ignoring_communication_loss_is_never_written(family: str) -> None:
     assert watch is not None
     with pytest.raises(ValueRefused, match="never written by Drive Panel"):
         Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 1})
-    # what the drive holds already is no edit
+    # a value that the drive already has is not an edit
     assert len(Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 0})) == 0

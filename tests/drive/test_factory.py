@@ -1,7 +1,7 @@
-"""Factory settings, and limits that follow another parameter: what is told of them, and how surely.
+"""Factory settings, and limits that follow another parameter, with their confidence.
 
-The figures are those of the makers' lists: 1.5 times a rated current of 4.8 A is raw 72, 0.2 times
-it raw 9, rounded down.
+The figures are from the makers' lists: 1.5 times a rated current of 4.8 A is raw 72, 0.2 times it
+raw 9, rounded down.
 """
 
 from __future__ import annotations

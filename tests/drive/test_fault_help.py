@@ -1,4 +1,4 @@
-"""What faults and alarms point at: a file of its own, read once somebody asks, checked."""
+"""Help for faults and alarms: a separate file, checked and read on demand."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ def test_invalid_help_file_is_reported_with_its_line(case: str, tmp_path: Path) 
     with pytest.raises(ProfileError, match=r"help/mine\.toml:\d+: ") as caught:
         _ = profile.guide.data
     assert output in str(caught.value)
-    # at work it hinders nobody: what is wrong is said in place of the help
+    # in use it blocks nothing: the error is shown instead of the help
     assert profile.guide.fault(9) is None
     assert "mine.toml" in profile.guide.trouble
 
@@ -167,7 +167,7 @@ def test_reset_text_always_warns_of_a_motor_that_may_start() -> None:
 
 
 def test_ways_of_reset_match_the_sources() -> None:
-    """Undervoltage leaves by itself: then a waiting run command starts the motor."""
+    """Undervoltage ends without a reset: then a waiting run command starts the motor."""
     for family, raw in (("atv31", 22), ("atv312", 22), ("atv71", 22)):
         help_ = library.load(family).guide.fault(raw)
         assert help_ is not None

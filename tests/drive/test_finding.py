@@ -1,4 +1,4 @@
-"""What profiles tell about finding drives: settings by likelihood, reads, timeouts."""
+"""Profile data for finding drives: settings by likelihood, reads, timeouts."""
 
 from __future__ import annotations
 

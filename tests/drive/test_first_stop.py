@@ -76,7 +76,7 @@ def test_command_register_of_one_family_is_not_a_setting_of_another() -> None:
 
 
 def states() -> Iterator[dict[int, int]]:
-    """What may be read of drives that are stopped by CMD, some of it not."""
+    """Words that may be read of drives stopped by CMD, some of them unread."""
     for chcf, dotd, eta in itertools.product((None, 0, 1, 2, 3), (None, 0, 1), (None, ENABLED, 8)):
         reported = {CHCF: chcf, DOTD: dotd, ETA: eta}
         yield {address: raw for address, raw in reported.items() if raw is not None}
@@ -124,7 +124,7 @@ def test_drive_that_would_coast_is_halted() -> None:
     assert word(CMD, {CHCF: 1, DOTD: 0, ETA: ENABLED}) == 0x010F
     assert word(CMD, {CHCF: 1, DOTD: 0, ETA: HALF_WAY}) == 0x0007
     assert word(CMD, {CHCF: 1, DOTD: 1, ETA: ENABLED}) == 0x0007
-    # one that was named may be there all the same, and 16#010F is no stop of it
+    # the named family may still be present, and 16#010F does not stop it
     assert word(CMD, {CHCF: 1, DOTD: 0, ETA: ENABLED}, "stop", "atv312") == 0x0007
 
 

@@ -1,4 +1,4 @@
-"""What a word of somebody else's program does to a drive, by its profile alone."""
+"""Effect of a word from another program on a drive, by its profile alone."""
 
 from __future__ import annotations
 

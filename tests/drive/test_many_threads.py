@@ -1,4 +1,4 @@
-"""Profiles that several threads want at once, as a search and a stop do, are loaded."""
+"""Profiles loaded by several threads at once, as by a scan and a stop."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds a command back, by the interlocks of each family that has some."""
+"""Conditions that block a command, by the interlocks of each family that has some."""
 
 from __future__ import annotations
 

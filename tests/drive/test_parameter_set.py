@@ -36,7 +36,7 @@ def read(text: str) -> ParameterSet:
 @settings(max_examples=25)
 @given(data=st.data())
 def test_every_parameter_of_every_profile_survives_a_round_trip(data: st.DataObject) -> None:
-    """Any word that a drive may answer, also one that the profile does not know a name of."""
+    """Any word that a drive may return, also one without a name in the profile."""
     profile = library.load(data.draw(st.sampled_from(FAMILIES)))
     seed = data.draw(st.randoms(use_true_random=False))
     raws = {p.code: seed.randint(*type_range(p)) for p in profile.parameters}
@@ -54,7 +54,7 @@ def test_every_parameter_of_every_profile_survives_a_round_trip(data: st.DataObj
 @settings(max_examples=25)
 @given(data=st.data())
 def test_value_without_its_raw_word_is_the_same(data: st.DataObject) -> None:
-    """What a person reads can stand alone, for every value in its range."""
+    """The readable text suffices, for every value in its range."""
     profile = library.load(data.draw(st.sampled_from(FAMILIES)))
     seed = data.draw(st.randoms(use_true_random=False))
     raws = {p.code: seed.choice(allowed(profile, p)) for p in profile.parameters if not p.unit_by}
@@ -106,7 +106,7 @@ def test_hand_edited_value_counts_if_raw_is_removed() -> None:
 
 
 FAULTS = [
-    # what is written, what it becomes, the line that counts, what the person is told
+    # old text, new text, line of the error, expected message
     ('value = "3.0 s"', 'value = "5.0 s"', "ACC", "raw 30 is 3.0 s, but value is 5.0 s"),
     ("raw = 30", "raw = 300", "ACC", "Delete raw in this line"),
     ("raw = 30", "raw = 70000", "ACC", "does not fit uint16"),

@@ -1,4 +1,4 @@
-"""Control characters as signs: what a drive calls itself must not command a terminal."""
+"""Control characters as symbols: the name of a drive must not control the terminal."""
 
 from __future__ import annotations
 

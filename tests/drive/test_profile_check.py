@@ -1,4 +1,4 @@
-"""`profiles --check`: every fault in one run, where it stands, and what is allowed there."""
+"""`profiles --check`: every error in one run, with its line and the allowed values."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ settings = [{ parameter = "MODE", value = 7 }]
 
 Change = tuple[str, str]
 
-# what is changed, what is told, and a text of the line that it is told of
+# the change, the message, and a text of the line that it names
 FAULTS: dict[str, tuple[list[Change], str, str]] = {
     "no stop": (
         [('  { id = "stop", name = "Stop", words = [0] },\n', "")],

@@ -374,7 +374,7 @@ def test_speed_limits_restrict_each_other(profile: Profile) -> None:
     raws = {"FH": 8000, "UL": 5000, "LL": 0, "FA01": 6000}
     past = Edits().stage(profile, "UL", "85 Hz", raws)
     assert "above FH = 80.00 Hz" in edit_problems(profile, past, raws)["UL"]
-    # the reference of the line is no setting: it holds up none
+    # the reference of the line is not a setting: it limits none
     lower = Edits().stage(profile, "FH", "55 Hz", raws)
     assert edit_problems(profile, lower, raws) == {}
 

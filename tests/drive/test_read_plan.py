@@ -191,7 +191,7 @@ def test_changeable_slots_are_read_after_their_block() -> None:
 def test_scanner_that_saves_no_time_is_not_used() -> None:
     profile = profile_of([500, 900, 2165, 2166, 2167], blocks=[SCANNER])
     plan = plan_reads(profile, codes([500, 900]), TIMING, slots={"P2165": 500, "P2166": 900})
-    # two reads of one word and two reads of two words: the drive is asked directly
+    # two reads of one word and two reads of two words: the drive is read directly
     assert spans(plan) == [(500, 1), (900, 1)]
     assert plan.checks == ()
 

@@ -46,7 +46,7 @@ def test_value_with_a_learned_scale_has_its_sign_and_mark(family: Profile) -> No
     own = with_taught(family, {"5.01": HERTZ, "1.21": RPM})
     value = shown(own, own["5.01"], 65236, {})
     assert (value.display, value.taught) == ("-30.0 Hz", True)
-    # whoever still holds the family's parameter is told the same
+    # code that still has the family's parameter gets the same result
     assert shown(own, family["5.01"], 65236, {}) == value
     assert typed_text(own, own["5.01"], 300, {}) == "30.0"
     unsure = shown(own, own["1.21"], 65236, {})

@@ -31,7 +31,7 @@ def look(word: int, shown: str, unit: str = "") -> DisplayLook:
 
 
 def honest(word: int, scale: Decimal, signed: bool, places: int, cut: str) -> DisplayLook:
-    """What an honest display shows of a word, with so many decimals, cut or rounded."""
+    """Reading of a correct display of a word, with this many decimals, cut or rounded."""
     count = word - 0x10000 if signed and word >= 0x8000 else word
     return DisplayLook(word, (count * scale).quantize(Decimal(1).scaleb(-places), cut), "Hz")
 
@@ -51,7 +51,7 @@ def test_every_scale_is_found_from_two_correct_readings(
     first, second = (honest(word, scale, signed, places, cut) for word in (number, other))
     assume(number != other)
     step = Decimal(1).scaleb(-places)
-    # two digits and a half are seen of one of them: enough to tell a scale from its neighbors
+    # two and a half digits of one are visible: enough to distinguish a scale from its neighbors
     assume(max(abs(first.shown), abs(second.shown)) >= 25 * step)
     lesson = taught(first, second)
     assert lesson.kind is LessonKind.TAUGHT, lesson.text

@@ -1,4 +1,4 @@
-"""Units in place of a parameter's own, and values that rounding makes others of."""
+"""Units other than that of a parameter, and values that rounding changes."""
 
 from __future__ import annotations
 

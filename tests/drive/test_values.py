@@ -52,7 +52,7 @@ def parameter(**fields: object) -> Parameter:
 @settings(max_examples=1500)
 @given(which=st.integers(0, len(ALL) - 1), share=st.floats(0, 1))
 def test_raw_value_survives_conversion_to_text(which: int, share: float) -> None:
-    """What the panel shows can be typed back and gives the same raw value."""
+    """Text shown by the panel can be typed back and gives the same raw value."""
     profile, p = ALL[which]
     names = profile.names(p)
     low, high = raw_range(p)

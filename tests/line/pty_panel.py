@@ -137,7 +137,7 @@ class PtyPanel:
     _rest: str = ""
 
     def type(self, *pieces: bytes | str, apart: float = SPLIT) -> None:
-        """Write to the terminal, each piece by itself."""
+        """Write to the terminal, each piece separately."""
         for index, piece in enumerate(pieces):
             if index:
                 time.sleep(apart)

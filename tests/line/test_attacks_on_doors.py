@@ -47,7 +47,7 @@ def halves(place: Place, chance: Random) -> None:
 
 
 def reads(place: Place, chance: Random) -> None:
-    """Requests without a pause, whose answers nobody takes."""
+    """Requests without a pause, whose replies are not read."""
     with connected(place, "127.0.0.2") as client:
         client.settimeout(0.2)
         for _ in range(chance.randrange(1, 400)):

@@ -1,6 +1,7 @@
-"""The benchmarks still run: each in small, to its line of JSON. Nobody judges what they measure.
+"""The benchmarks still run: each in small, to its line of JSON.
 
-Two of them ended with an error, unseen: a word on a screen had changed, and what the line counts.
+Their results are not checked. Two of them failed unnoticed: a word on a screen had changed, and
+what the line counts.
 """
 
 from __future__ import annotations

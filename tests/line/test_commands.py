@@ -1,6 +1,6 @@
-"""Commands that move motors: run, reference, reset, stop and status, as processes of their own.
+"""Commands that move motors: run, reference, reset, stop and status, as separate processes.
 
-The simulator is in the test's own process, so that the motor itself tells what became of it.
+The simulator is in the process of the test, which can check the motor directly.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ ALTIVARS = ["atv21", "atv31", "atv312", "atv71"]
 
 @contextmanager
 def bench(*specs: DriveSpec) -> Iterator[tuple[Simulation, str]]:
-    """Simulated drives and the LINE to them; an Altivar 71 at address 1 unless told otherwise."""
+    """Simulated drives and the LINE to them (default: an Altivar 71 at address 1)."""
     with Simulation(list(specs) or [DriveSpec("atv71", 1)]) as simulation:
         yield simulation, f"serial:{simulation.serve_pty()},19200,8N1"
 
@@ -65,7 +65,7 @@ def stands(simulation: Simulation, device: int = 1) -> bool:
 
 
 def besides(output: str) -> str:
-    """What standard error has beside the communication timeout that a command leaves running."""
+    """Standard error without the warning about the communication timeout."""
     reported = ("communication timeout", "To keep polling it: drivepanel hold")
     return "".join(line for line in output.splitlines(True) if not any(t in line for t in reported))
 
@@ -123,7 +123,7 @@ def test_closed_output_stops_the_motor() -> None:
 
 
 def test_unread_output_does_not_delay_a_stop() -> None:
-    """A terminal held by Ctrl-S takes nothing; here a pipe that is full from the start."""
+    """A terminal paused by Ctrl-S accepts no output; here a pipe that is full from the start."""
     reading, writing = os.pipe()
     with bench() as (simulation, line):
         os.set_blocking(writing, False)
@@ -281,7 +281,7 @@ def test_motor_is_stopped_when_a_lost_line_returns(loss: str, tmp_path: Path) ->
             program.process.send_signal(signal.SIGINT)
             assert "NOT STOPPED yet" in program.process.stderr.readline()
             assert program.process.poll() is None
-            # a stop reaches a drive whose replies are lost; one that is cut off turns on
+            # a stop reaches a drive whose replies are lost; a disconnected one runs on
             assert turns(simulation) or loss == "silent"
             give_back(simulation)
             out, _ = program.process.communicate(timeout=PATIENCE)
@@ -437,7 +437,7 @@ def test_stop_all_stops_every_drive() -> None:
 
 
 def test_stop_all_names_drives_not_stopped_and_stops_the_others() -> None:
-    # a drive that refuses to say who it is may be any family
+    # a drive that refuses identification may be any family
     specs = [
         DriveSpec("atv21", 1, identity={1: "UNHEARD OF"}),
         DriveSpec("atv71", 2, run_hz=20.0),
@@ -473,7 +473,7 @@ def test_answering_drives_are_stopped_before_silent_addresses_time_out() -> None
         with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as program:
             assert program.stdout is not None
             assert "Device 10, Altivar 71: stopped." in program.stdout.readline()
-            # the silent nine are still asked with patience
+            # the nine silent addresses are still probed with a longer wait
             assert program.poll() is None
             assert stands(simulation, 10)
             program.kill()
@@ -506,7 +506,7 @@ def test_started_motor_that_no_scan_finds_exits_with_3() -> None:
         left = ("--for", "1", "--leave-running")
         run = drivepanel("run", line, "-d", "31", "--reference", "20Hz", "--arm", *left)
         assert run.returncode == 0, run.stderr
-        end_keepers()  # which would stop it by itself, as it was armed there
+        end_keepers()  # which would stop it, as it was armed there
         silence(simulation)
         done = drivepanel("stop", line, "--all")
         assert done.returncode == 3, done.stdout + done.stderr
@@ -668,7 +668,7 @@ def test_status_of_every_family_is_shown(family: str) -> None:
 
 
 def test_simulated_line_uses_the_settings_of_its_first_drive(tmp_path: Path) -> None:
-    """Who simulates a drive and reads it, names no baud and no format for it."""
+    """Simulated lines need no baud and no format."""
     link = tmp_path / "line"
     with simulated("powerdrive@1", "--pty", str(link)) as there:
         assert f"serial:{link},19200,8N2." in there.ready

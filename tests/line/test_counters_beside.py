@@ -33,7 +33,7 @@ def test_counters_include_a_panel_and_their_reset_is_shown_there(
         assert reported["test"] == {"frames": 20, "answered": 20}
         assert reported["ours"]["frames"] > 20, "what the panel sends meanwhile belongs to it"
         assert reported["differences"] == []
-        # who resets the drive's counters is told to whoever compares them
+        # programs that compare the counters report who reset them
         again = drivepanel("counters", line, "-d", "1", "--reset-drive", "--arm", "--frames", "3")
         assert again.returncode == 0, again.stdout + again.stderr
         panel.wait_for("restarted its counters")

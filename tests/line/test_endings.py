@@ -1,4 +1,4 @@
-"""How commands end: signals, closed pipes, what they leave behind."""
+"""Ends of commands: signals, closed pipes, leftovers."""
 
 from __future__ import annotations
 

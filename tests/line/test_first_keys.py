@@ -26,7 +26,7 @@ def test_f12_is_tested_once_while_no_line_is_open(
 def test_unknown_key_sequence_is_reported(terminal_with: Start) -> None:
     terminal = terminal_with(PANEL)
     terminal.wait_for("press F12")
-    # as raw bytes: a sequence of nobody
+    # as raw bytes: a sequence of no terminal
     terminal.run("send-keys", "-H", "1b", "5b", "39", "39", "39", "7e")
     terminal.wait_for("does not know", "ESC [999~")
 

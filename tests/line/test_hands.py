@@ -1,4 +1,4 @@
-"""What a person's hands, a terminal and a link do to a panel, seen from the line."""
+"""Effects of a person, a terminal and a link on a panel, seen from the line."""
 
 from __future__ import annotations
 

@@ -41,13 +41,13 @@ def test_resumed_frozen_keeper_exits() -> None:
         assert is_running(pid), "a process that is stopped takes no alarm"
         os.kill(pid, signal.SIGCONT)
         wait_until(lambda: not is_running(pid), "it ends")
-        # by the alarm: one that goes on would take its socket away in the end
+        # by the alarm: a resumed keeper would remove its socket at its end
         assert list(Path(os.environ["DRIVEPANEL_STATE"]).rglob("*.sock"))
 
 
 @contextmanager
 def frozen_keeper(programs: ExitStack, line: str) -> Iterator[tuple[int, Served, Served]]:
-    """A keeper that stands still while a motor runs; with `run`, and a recorder."""
+    """A keeper that is frozen while a motor runs; with `run`, and a recorder."""
     recorder = programs.enter_context(served(records(line), ready="{"))
     runner = programs.enter_context(served(runs_a_motor(line), ready="running forward"))
     pid = keeper()

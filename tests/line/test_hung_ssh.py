@@ -110,7 +110,7 @@ class Far:
                     self.terminal.press(key)
 
     def moved(self, since: int) -> list[object]:
-        """Writes after so many that are no ramp stop."""
+        """Later writes that are not ramp stops."""
         later = self.log.writes[since:]
         return [write for write in later if (write.register, write.words) != (COMMAND, (7,))]
 

@@ -84,7 +84,7 @@ def times_of_good_values(recorder: Served, seconds: float) -> list[float]:
 
 def test_keeper_inherits_nothing_and_outlives_its_command() -> None:
     with bench() as (_, line):
-        # the command substitution of a shell waits for whoever has its output open
+        # the command substitution of a shell waits for every process with its output open
         assert read(line).returncode == 0
         pid = keeper()
         process = Path("/proc", str(pid))
@@ -174,7 +174,7 @@ def test_motor_runs_on_if_the_keeper_exits_but_not_its_program(
         assert turns(simulation)
         assert simulation.drive(1).fault is None
         assert runner.process.poll() is None
-        # and whoever wants to, stops it
+        # and any program can stop it
         assert drivepanel("stop", line, "-d", "1", "-p", "atv71").returncode == 0
         assert stopped_by_commands(simulation)
         assert runner.process.wait(PATIENCE) == 6
@@ -315,7 +315,7 @@ def test_line_of_a_script_is_held_by_a_keeper(programs: ExitStack) -> None:
         started = served(script, ready="\n", stdin=subprocess.PIPE)
         script_process = programs.enter_context(started).process
         assert holders(line.removeprefix("serial:").partition(",")[0]) == [keeper()]
-        # it is frozen, and nobody waits for it
+        # it is frozen, and no program waits for it
         script_process.send_signal(signal.SIGSTOP)
         done = read(line)
         assert done.returncode == 0, done.stderr

@@ -61,7 +61,7 @@ def test_motor_of_a_frozen_program_is_kept_alive_until_it_is_stopped() -> None:
         wait_until(lambda: turns(simulation), "the motor turns")
         runner.process.send_signal(signal.SIGSTOP)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops on its ramp", 10.0)
-        # nobody reads it from then on
+        # no program reads it from then on
         wait_until(lambda: tripped(simulation), "the drive trips")
         runner.process.kill()
 

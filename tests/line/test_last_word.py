@@ -18,7 +18,7 @@ PAUSES = (0.02, 0.06, 0.2, 0.5)
 
 
 def at_rest(panel: PtyPanel) -> None:
-    """See the motor stand, as it must behind a stop."""
+    """Check that the motor is at standstill, as it must be after a stop."""
     wait_until(lambda: panel.simulation.drive(1).motor.frequency == 0, "the motor stands")
 
 

@@ -31,7 +31,7 @@ def again(start: Start, simulation_line: str) -> Terminal:
 
 
 def frames(simulation: Simulation) -> int:
-    """How often the drive's command word was written so far."""
+    """Count the writes of the drive's command word so far."""
     return simulation.drive(1).raw("CMD")
 
 
@@ -64,7 +64,7 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
 
 @INSIDE
 def test_leaving_a_disowned_motor_asks_first(terminal_with: Start, second_terminal: Start) -> None:
-    """Its polls feed the drive's timeout: one q alone would let the motor coast later."""
+    """Its polls keep the drive alive: one q alone would let the motor coast later."""
     with running(terminal_with) as made:
         os.kill(made.pid, signal.SIGKILL)
         wait_until(lambda: not runs(made.pid), "the panel is gone")

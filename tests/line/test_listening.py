@@ -58,7 +58,7 @@ def tapped_cable(drives: str) -> Iterator[tuple[str, str]]:
 
 
 def test_mbpoll_traffic_is_monitored(peer: Peer, tmp_path: Path) -> None:
-    """What mbpoll reads and writes is told, and is in the file as tshark reads it."""
+    """Reads and writes of mbpoll are reported, and are in the file as tshark reads it."""
     mbpoll, tshark = peer("mbpoll", "mbpoll"), peer("tshark", "tshark")
     file = tmp_path / "frames.pcapng"
 
@@ -104,7 +104,7 @@ def test_mbpoll_traffic_is_monitored(peer: Peer, tmp_path: Path) -> None:
 
 
 def test_monitoring_sends_nothing_to_the_port(peer: Peer, tmp_path: Path) -> None:
-    """By strace: the port is opened for reading, set up, locked and read; nothing else."""
+    """By strace: the port is opened for reading, configured, locked and read; nothing else."""
     strace = peer("strace", "strace")
     log = tmp_path / "calls"
     requests = [bytes.fromhex("02030c810001"), bytes.fromhex("020621360000")]

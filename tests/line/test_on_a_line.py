@@ -148,7 +148,7 @@ async def test_polling_continues_while_the_screen_is_frozen(five: OpenLine) -> N
     await until(lambda: monitor.latest is not None)
     assert monitor.latest is not None
     before = monitor.latest.cycle
-    time.sleep(2.0)  # noqa: ASYNC251 - this loop stands still, as a stalled terminal makes it
+    time.sleep(2.0)  # noqa: ASYNC251 - this loop hangs, like one with a stalled terminal
     assert monitor.latest.cycle - before >= 10
     monitor.stop()
 
@@ -247,7 +247,7 @@ async def test_drive_is_kept_alive_under_any_load() -> None:
 async def test_drive_without_keep_alive_is_reported_before_it_trips(tmp_path: Path) -> None:
     simulation = Simulation([DriveSpec("atv21", 1, run_hz=35.0)])
     simulation.start()
-    # a name of its own: the number of a pseudo-terminal may be taken by others meanwhile
+    # a name of its own: the number of a pseudo-terminal may be reused
     opened = open_line(f"serial:{simulation.serve_pty(str(tmp_path / 'line'))},19200,8N1", wait=5.0)
     opened.simulation = simulation
     line_watch = LineWatch(opened.line)

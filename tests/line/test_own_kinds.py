@@ -1,7 +1,8 @@
-"""Drives of two other makes by a file alone, at a server on libmodbus with awkward habits.
+"""Drives of two other makes by a file alone, at a libmodbus server with unusual behavior.
 
 It answers after 30 ms, reads 8 words at most and none over a hole, is silent at function 43, and
-puts the high word first. Both files lie in `profiles`, and are examples that no drive confirms.
+puts the high word first. Both files are in `profiles`. They are examples that no real drive
+confirms.
 """
 
 from __future__ import annotations
@@ -56,13 +57,13 @@ class Bench:
         return drivepanel(command, self.line, *more, *there)
 
     def done(self, command: str, *more: str) -> str:
-        """What a command prints that comes to its end."""
+        """Output of a command that ends."""
         done = self.run(command, *more)
         assert done.returncode == 0, done.stderr + done.stdout
         return done.stdout
 
     def status(self) -> dict[str, object]:
-        """What the drive does."""
+        """State of the drive."""
         reported: dict[str, object] = json.loads(self.done("status", "--json"))
         return reported
 

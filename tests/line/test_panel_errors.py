@@ -62,7 +62,7 @@ PLACES = {
     "renderer": ("", "tui.widgets.lines:Lines.render_lines"),
     "picture": ("", "tui.terminal.lean_app:LeanApp._display"),
 }
-"""Where else an error comes from, and the keys that lead there."""
+"""Other origins of an error, and the keys that lead there."""
 ERRORS = (
     "RecursionError",
     "MemoryError",
@@ -77,7 +77,7 @@ SECOND = {
     "sentence": "tui.app:DrivePanelApp.last_words",
     "bookkeeping": "tui.session.monitor.line_watch:LineWatch.under_command",
 }
-"""Where a second error comes from while the panel ends."""
+"""Origins of a second error while the panel ends."""
 UNSEEN = {
     "wait": ("RuntimeError", "tui.session.command.stop:Stopper.wait", "Device 1: it"),
     "result": ("RuntimeError", "tui.screens.last_stops:LineStops.lines", "It"),
@@ -91,7 +91,7 @@ HANGS = {
     "loop": "tui.terminal.last_words:LastWords._fatal_error",
     "terminal": "textual.drivers.linux_driver:LinuxDriver.stop_application_mode",
 }
-"""What may hang while the panel ends."""
+"""Parts that may hang while the panel ends."""
 
 
 SLOW, QUICK = 6000, 5
@@ -109,7 +109,7 @@ def failing(
     if dialog:
         look = "tui.screens.status_refresher:StatusRefresher.look_around"
         wanted.append(Plant(look, str(folder / "open"), dialog=dialog))
-    # who renders a traceback first never comes to the stop
+    # rendering a traceback first would prevent the stop
     wanted.append(Plant("rich.traceback:Traceback.__init__", str(folder / "now"), "hang"))
     program = ("tests.line.failing_panel", planted(*wanted))
     with panel_on_a_pty(*options, program=program) as panel:
@@ -322,7 +322,7 @@ def test_hung_exit_is_ended(hang: str, tmp_path: Path) -> None:
 def test_blocked_terminal_delays_neither_the_stop_nor_the_exit(
     tmp_path: Path,
 ) -> None:
-    # from many frames on its buffer is full: nobody reads here
+    # after many frames its buffer is full: it is not read here
     with failing(tmp_path, ("RuntimeError", "tui.terminal.reader:KeyReader.read")) as panel:
         panel.type("\x0c" * 40, apart=0.1)
         for _ in range(40):

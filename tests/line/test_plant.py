@@ -71,14 +71,14 @@ class RealBroker:
         (self.folder / "log").unlink()
 
     def output(self, text: str) -> int:
-        """How often its log has a text."""
+        """Count a text in its log."""
         return (self.folder / "log").read_text("utf-8", "replace").count(text)
 
     def options(self, user: str) -> list[str]:
         return ["-h", "127.0.0.1", "-p", str(self.port), "-u", user, "-P", f"of {user}"]
 
     def retained(self, topic: str, *options: str) -> dict[str, str]:
-        """All that is retained there, as scada is told."""
+        """All retained messages, as scada receives them."""
         reported = ["-v", "-t", topic, "--retained-only", "-W", "1", *options]
         done = subprocess.run(
             ["mosquitto_sub", *self.options("scada"), *reported],
@@ -182,7 +182,7 @@ def test_last_will_is_published_within_one_and_a_half_keep_alives(
 ) -> None:
     made = publishing(programs, broker)
     assert broker.status == "online"
-    # how long a broker waits is its own affair: 1.5 times what it was told here
+    # the broker decides how long it waits: here 1.5 times the configured time
     assert broker.output(f"k{MQTT_KEEPALIVE}, u'drives'") == 1
     made.program.process.send_signal(number)
     wait_until(lambda: broker.status == "offline", "the will")

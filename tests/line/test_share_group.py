@@ -1,4 +1,4 @@
-"""A line that users of a group share: off unless asked for, and closed to everybody else."""
+"""A line shared by the users of a group: off by default, and closed to other users."""
 
 from __future__ import annotations
 

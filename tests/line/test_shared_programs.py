@@ -48,14 +48,14 @@ def records(line: str, device: int = 1) -> list[str]:
 
 
 def left_over() -> list[str]:
-    """Sockets and notes of stops that lie in the state folder once its keepers have ended."""
+    """Sockets and notes of stops in the state folder once its keepers have ended."""
     end_keepers()
     state = Path(os.environ["DRIVEPANEL_STATE"])
     return [path.name for path in state.rglob("*.s*") if path.suffix in (".sock", ".stop")]
 
 
 def stopped_by_commands(simulation: Simulation, device: int = 1) -> bool:
-    """Whether the motor stands without a trip: nobody fed it, and nobody cut it off."""
+    """True if the motor is at standstill without a trip: it was stopped by a command."""
     return stands(simulation, device) and simulation.drive(device).fault is None
 
 
@@ -83,7 +83,7 @@ def motor_run(
 def test_motor_of_a_killed_program_is_stopped_by_the_remaining_one(
     programs: ExitStack, first: str
 ) -> None:
-    """A recorder asks the drive on and on: its own timeout would never stop the motor."""
+    """A recorder keeps polling the drive: its own timeout would never stop the motor."""
     with motor_run(programs, first) as (simulation, _, runner, recorder):
         runner.process.kill()
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
@@ -154,7 +154,7 @@ def test_stop_after_a_malformed_greeting_stops_the_motor(programs: ExitStack, co
 def test_recorder_does_not_keep_the_motor_of_a_frozen_program_alive_forever(
     programs: ExitStack, holder: str
 ) -> None:
-    """Its socket stays open, its process lives: nothing but its silence tells."""
+    """Its socket stays open, its process lives: only its silence shows it."""
     with motor_run(programs, "watch", time_out=50) as (simulation, _, runner, recorder):
         runner.process.send_signal(signal.SIGSTOP)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops on its ramp")
@@ -258,7 +258,7 @@ def test_stop_delayed_by_a_frozen_owner_is_reported_and_carried_out(
 
 @pytest.mark.usefixtures("held_inside")
 def test_motor_of_a_frozen_owner_is_not_kept_alive(programs: ExitStack) -> None:
-    """The drive's own timeout stops it, as it would if nobody shared the line."""
+    """The drive's own timeout stops it, as on an unshared line."""
     with motor_run(programs, "run", time_out=20) as (simulation, _, runner, recorder):
         runner.process.send_signal(signal.SIGSTOP)
         wait_until(lambda: simulation.drive(1).fault is not None, "the drive's own timeout")
@@ -315,7 +315,7 @@ def panel_run(
 
 
 def on_record() -> list[bool]:
-    """Of each start on record, whether its motor is meant to be left running."""
+    """For each recorded start, True if its motor is to be left running."""
     found = []
     for path in Path(os.environ["DRIVEPANEL_STATE"], "starts").glob("*.json"):
         with suppress(FileNotFoundError):  # taken away since it was listed
@@ -328,7 +328,7 @@ def on_record() -> list[bool]:
 def test_hangup_choice_applies_to_every_loss_of_the_panel(
     programs: ExitStack, terminal_with: Start, number: signal.Signals
 ) -> None:
-    """The recorder takes the line over, feeds the drive, and leaves the motor as registered."""
+    """The recorder takes the line over, keeps the drive alive, and leaves the motor running."""
     with panel_run(programs, terminal_with, "--on-hangup", "leave-running") as (made, recorder):
         assert on_record() == [True]
         os.kill(made.pid, number)

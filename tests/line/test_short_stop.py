@@ -45,7 +45,7 @@ def panel(with_keepers: None) -> Iterator[OpenLine]:
 
 
 def stops_heard(facts: SharedState) -> list[tuple[tuple[int, ...], Program, bool]]:
-    """Stops of others from now on: of which devices, by whom, and True if that one is attached."""
+    """Later stops by others: their devices, their program, and True if it is attached."""
     heard: list[tuple[tuple[int, ...], Program, bool]] = []
 
     def hear(event: DevicesStopped) -> None:

@@ -78,7 +78,7 @@ def run_and_signal(*numbers: int, ignored: bool = False) -> tuple[int, float, bo
 
 
 def stopped_by(number: int) -> tuple[int, float, bool, str]:
-    """The same for a motor that was stopped, and by whom."""
+    """The same for a stopped motor, and its source."""
     return 0, 0.0, False, signal_name(signal.SIGTERM if number in FROM_OUTSIDE else number)
 
 
@@ -176,8 +176,9 @@ OWNERS = {
     "listen": (("sim:atv71@2",), "Listening", 128),
     "simulate": (("atv71@2", "--tcp", "127.0.0.1:0"), "Ready", -signal.SIGUSR1),
 }
-"""Commands that own a line for long: words, the first words they print, and what is added to the
-number of the signal that ends them."""
+"""Commands that own a line for long: words, the first words they print, and the number added to the
+signal that ends them.
+"""
 
 
 @pytest.mark.parametrize("name", OWNERS)

@@ -19,7 +19,7 @@ NEARLY_FULL = 60_000
 
 
 def typed(simulation: Served, line: str) -> str:
-    """What the program says to a line that somebody types."""
+    """Reply of the program to a typed line."""
     process = simulation.process
     assert process.stdin is not None
     assert process.stdout is not None
@@ -79,7 +79,7 @@ def test_simulate_ends_normally_with_unread_output() -> None:
 
 
 def waiting(pipe: IO[str]) -> int:
-    """Bytes in a pipe that nobody has read."""
+    """Unread bytes in a pipe."""
     count = array("i", [0])
     fcntl.ioctl(pipe, termios.FIONREAD, count)
     return count[0]

@@ -1,4 +1,4 @@
-"""The panel over a real SSH session in a real terminal, also when that terminal stands still.
+"""The panel over a real SSH session in a real terminal, also when that terminal is frozen.
 
 A private SSH server on loopback, with keys of its own, serves a client inside a private tmux.
 """
@@ -30,11 +30,11 @@ from .terminal import Terminal, runs
 
 ROOT = Path(__file__).resolve().parents[2]
 STALL = 10.0
-"""Seconds for which the terminal stands still."""
+"""Seconds for which the terminal is frozen."""
 DRIVE_ROW = re.compile(r" +\d+ (\S+)")
 """A drive on Line: its address and its reference."""
 MORE_REQUESTS = 20
-"""Requests that must still come while it stands still."""
+"""Requests that must still arrive in this time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +46,7 @@ class SshHost:
 
 @pytest.fixture
 def ssh_host(peer: Peer, tmp_path: Path) -> Iterator[SshHost]:
-    """An SSH server on loopback that lets in the key made for it, and nobody else."""
+    """An SSH server on loopback that accepts only the key made for it."""
     server = shutil.which("sshd") or shutil.which("sshd", path="/usr/sbin:/usr/local/sbin")
     if server is None:
         need_peer("sshd is not here; it comes with the package openssh-server.")
@@ -214,7 +214,7 @@ def choose(terminal: Terminal, name: str) -> None:
 
 @contextmanager
 def stopped(*pids: int) -> Iterator[None]:
-    """Processes that stand still while the block runs."""
+    """Freeze processes during the block."""
     for pid in pids:
         os.kill(pid, signal.SIGSTOP)
     try:
@@ -236,7 +236,7 @@ def _fill_terminal_of(pid: int) -> None:
 
 
 def _stands_still(pid: int) -> bool:
-    """Whether a process wrote nothing to files and terminals for two seconds."""
+    """True if a process wrote nothing to files and terminals for two seconds."""
     before = _written(pid)
     time.sleep(2)
     return _written(pid) == before

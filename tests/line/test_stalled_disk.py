@@ -1,4 +1,4 @@
-"""Stops while the disk with the state folder gives nothing, and takes nothing."""
+"""Stops while the disk with the state folder blocks reads and writes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Faults of a line: first-out, told once, looked at, reset, and kept in the journal."""
+"""Faults of a line: first-out, reported once, acknowledged, reset, and kept in the journal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Words that a person asks for, where one that the drive does not have meets silence."""
+"""Requested words of a drive that is silent at a word it does not have."""
 
 from __future__ import annotations
 

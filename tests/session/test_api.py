@@ -1,4 +1,4 @@
-"""What scripts are given of a line and its drives, over simulated ones; docs/api.md as printed."""
+"""The Python API on simulated drives; docs/api.md as printed."""
 
 from __future__ import annotations
 
@@ -222,7 +222,7 @@ def test_stop_lasts_and_ends_arming() -> None:
 def test_stop_by_another_program_blocks_later_writes_in_the_block_only(
     line: DriveLine, drive: Drive
 ) -> None:
-    """A script that lives on may arm again; one stop is told of more than once."""
+    """A script that continues may arm again; one stop is reported more than once."""
     facts = line._calls.line.facts
     other = Program("another's id", "stop", 4711)
     facts.events.emit(DevicesStopped((1,), "drivepanel stop", other))

@@ -1,4 +1,4 @@
-"""Applying edits to simulated drives: written once, read back, never over somebody's change."""
+"""Applying edits to simulated drives: written once, read back, never over a foreign change."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Who looks on at a drive keeps no motor running whose commander has died."""
+"""Polling by an observer keeps no motor running whose commander has died."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TTO = 10.0
 
 @dataclass
 class Bench:
-    """A drive that is looked on at, at a time that the test tells."""
+    """An observed drive, at a time that the test sets."""
 
     time: float = 100.0
     sign: float | None = None
@@ -43,7 +43,7 @@ class Bench:
         )
 
     def asks(self, after: float = 1.0) -> bool:
-        """Whether the drive is asked some seconds later; it answers then."""
+        """Return True if the drive is polled some seconds later; it answers then."""
         self.time += after
         self.session.timeout = self.timeout
         why = self.looks_on.held_back()
@@ -54,7 +54,7 @@ class Bench:
         return not why
 
     def saw(self, motion: str, error: str = "") -> None:
-        """What the last cycle brought, now."""
+        """Set the result of the last cycle to the current time."""
         state = SimpleNamespace(motion=motion)
         self.latest = SimpleNamespace(state=state, error=error, time=self.time)
 
@@ -72,7 +72,7 @@ def test_drive_is_polled_for_a_while_after_each_heartbeat_of_its_commander() -> 
         assert bench.asks(0.5)
         assert bench.asks(GRACE_SHARE * TTO - 0.5)
     assert not bench.asks(0.1), "the client has died"
-    # nothing feeds its timeout; once it must have acted, it is looked at
+    # nothing restarts its timeout; once it has expired, the drive is read
     assert not bench.asks(TTO - 0.2)
     assert bench.asks(ACTED_AFTER + 0.2)
     assert not bench.asks()

@@ -1,4 +1,4 @@
-"""Words whose bytes arrive swapped: seen, told, and no command sent; stops go out."""
+"""Words whose bytes arrive swapped: detected, reported, and no command sent; stops are sent."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ async def test_monitor_of_swapped_bytes_shows_no_good_value(kind: str) -> None:
 
 
 async def wait_for_order(session: DriveSession) -> None:
-    """The settings of a mended line show that words arrive as they should."""
+    """The settings of a repaired line show the correct byte order."""
     await check(session)
     assert session.byte_order.error is None
 
@@ -167,7 +167,7 @@ async def test_stop_with_swapped_bytes_is_sent_but_never_reported_as_done(family
 
 
 async def test_stop_with_swapped_bytes_never_uses_the_word_of_another_chart() -> None:
-    """16#0300 is CHCF 3 swapped: no chart; the words of Drivecom run a motor in the I/O profile."""
+    """16#0300 is CHCF 3 swapped: no chart; Drivecom words run a motor in the I/O profile."""
     with line_to(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0})) as (simulation, line, session):
         stopper = Stopper(line, Journal())
         stopper.stop([session])

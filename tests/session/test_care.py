@@ -1,4 +1,4 @@
-"""What the holder of a line does with the drives that other programs on it have armed."""
+"""Drives armed by other programs of a line, as its holder takes care of them."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def kept() -> Iterator[tuple[DrivesInCare, FakeLine, Journal]]:
 
 
 def guard(bench: Bench) -> OrphanMotorGuard:
-    """One that knows no drive by itself, as a keeper."""
+    """A holder without drives of its own, like a keeper."""
     return OrphanMotorGuard(bench.line, bench.journal, clock=bench.clock, starts=bench.starts)
 
 

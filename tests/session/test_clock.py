@@ -1,4 +1,4 @@
-"""The clock of a session: what counts by it, and the one that tests move on."""
+"""The clock of a session: times that depend on it, and the clock that tests advance."""
 
 from __future__ import annotations
 
@@ -34,13 +34,14 @@ OWN_TIME = {
     "running/motor_run.py",
     "running/watching.py",
 }
-"""Modules that use the real clock: the journal's own thread, threads that wait for a stop, and
-programs that wait for the motor that they run."""
+"""Modules that use the real clock: the thread of the journal, threads that wait for a stop, and
+programs that wait for the motor that they run.
+"""
 SESSION = Path(tui.session.__file__).parent
 
 
 def real_times(tree: ast.Module) -> Iterator[str]:
-    """Where a module asks the real clock, or sleeps by it."""
+    """Places where a module reads the real clock, or sleeps by it."""
     for node in ast.walk(tree):
         match node:
             case ast.Attribute(
@@ -69,7 +70,7 @@ class ConnectedLine:
     facts = SharedState()
 
     def describe(self, _device: int, _limits: Limits) -> None:
-        """What a device may be sent does not matter here."""
+        """The limits of a device do not matter here."""
 
 
 @pytest.fixture
@@ -104,7 +105,7 @@ def test_known_value_becomes_stale(session: DriveSession) -> None:
     clock.advance(60)
     assert session.image.fresh(5.0) == {}
     assert session.image.age("ACC") >= 60
-    # what the line has told before is as old as it is, however late it is asked for
+    # an earlier value keeps its age, however late it is requested
     session.image.confirm("DEC", 40, clock.line_time(time.monotonic()))
     assert session.image.age("DEC") < 60
 
@@ -121,7 +122,7 @@ def test_time_of_day_is_stable_unless_the_clock_is_set() -> None:
 
     clock = Notified()
     assert clock.wall_of(99.0) == 5099.0
-    # the two are asked one after the other, and the time of day is steered
+    # both clocks are read one after the other, and the time of day is controlled
     clock.now, clock.ahead = 101.0, 5000.001
     assert clock.wall_of(99.0) == 5099.0
     clock.ahead = 4000.0

@@ -53,7 +53,7 @@ class Bench(NamedTuple):
         return self.console.session
 
     async def done(self, kind: OutcomeKind = OutcomeKind.DONE, seconds: float = 10.0) -> str:
-        """What the order that was just given comes to."""
+        """Result of the last command."""
         before = self.commander.outcome
         end = time.monotonic() + seconds
         while time.monotonic() < end:
@@ -75,7 +75,7 @@ class Bench(NamedTuple):
 
     @property
     def clock(self) -> FakeClock:
-        """What the session and the drive count by."""
+        """Clock of the session and the drive."""
         assert isinstance(self.session.clock, FakeClock)
         return self.session.clock
 
@@ -91,7 +91,7 @@ class Bench(NamedTuple):
 
     @property
     def stopped(self) -> bool:
-        """Whether the last stop has come to its end."""
+        """True if the last stop has ended."""
         report = self.stopper.reports.get(1)
         return report is not None and report.phase is Phase.STOPPED
 

@@ -65,7 +65,7 @@ def reported(before: DriveCount, now: DriveCount) -> dict[str, int]:
         (count(150, 3, sent=20, answered=16), {"not-from-here": 30, "not-answered": 4}),
         (count(100, 3, sent=20, answered=20), {"another-port": 20}),
         (count(12, 0, sent=20, answered=20), {"counted-anew": 0}),
-        # a count of errors never falls by itself
+        # a count of errors never decreases without a reset
         (count(120, 0, sent=20, answered=20), {"counted-anew": 0}),
     ],
 )  # fmt: skip
@@ -172,7 +172,7 @@ async def test_replies_lost_on_the_way_back_are_reported(tcp: bool) -> None:
         ]
         assert now.since.timeouts == 3
         counted = dict(now.drive)
-        # both ways to ask tell the same counters; the keypad port has heard nothing
+        # both functions return the same counters; the keypad port has received nothing
         assert counted[THIS_PORT].frames > 8
         assert counted["Modbus network"].counts_this_line
         assert counted["Keypad port"].counts_this_line is False
@@ -237,7 +237,7 @@ async def test_drive_counters_are_reset_and_compared_from_zero(tmp_path: Path) -
         await watch.look()
         now = watch.now()
         assert now.agree
-        # ours of the line stay, for whoever else looks at them
+        # own counts of the line stay, for other users of them
         assert now.total.requests > now.since.requests
 
 

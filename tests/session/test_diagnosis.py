@@ -1,4 +1,4 @@
-"""Why a drive does not answer: each rung of the ladder provoked, with its one sentence."""
+"""Causes of a silent drive: each check of the sequence provoked, with its sentence."""
 
 from __future__ import annotations
 
@@ -103,7 +103,7 @@ def of(sight: DiagnosticEvidence) -> Diagnosis:
 
 
 def heard(**seen: Any) -> DiagnosticEvidence:
-    """What a drive answered on a good port."""
+    """Replies of a drive on a good port."""
     return DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=3, **seen))
 
 
@@ -491,7 +491,7 @@ async def test_diagnosis_uses_operator_priority() -> None:
     assert seen == [Priority.OPERATOR_READ] * 3
 
 
-# Where no frames are at hand: a line that another program owns tells errors alone
+# Without frames: a line that another program owns reports errors only
 
 
 @pytest.mark.parametrize(

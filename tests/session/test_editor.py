@@ -110,7 +110,7 @@ async def test_running_motor_locks_parameters_that_need_standstill() -> None:
         editor.staging.stage("ACC", "4")
         editor.apply()
         assert "Nothing written. 2 still staged" in await written(made, editor)
-        # a person is asked before the rest is written
+        # a question comes before the rest is written
         assert editor.applied is not None
         assert editor.applied.waits == ("ACC",)
         assert made.drive.raw("ACC") == 30

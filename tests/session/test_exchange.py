@@ -444,7 +444,7 @@ def test_values_and_frame_are_shown_before_sending() -> None:
         first, second, third, *rest = reported.follows.splitlines()
         assert (first, second) == ("NCA1: CMD 16#000F", "NCA3: HSP 45.0 Hz")
         assert "Also written, with its present value: LFRD" in third
-        # three words from NC1 on: the command, the reference of now, the high speed
+        # three words from NC1 on: the command, the current reference, the high speed
         assert (
             rest[-1].replace(" ", "").lower().startswith("frame:011731c5000831d9000306000f038401c2")
         )
@@ -480,7 +480,7 @@ def test_slots_waiting_for_a_reset_are_not_used_for_writing() -> None:
         outputs = plan_of(here, "write", ["FA00", "FA01"])
         with pytest.raises(MappingError, match="Not in effect yet: F871"):
             refuse_pending(outputs, {"F871": 3, "F875": 1})
-        # slots of the other block, and what never came to be written, hinder nothing
+        # slots of the other block, and unwritten ones, block nothing
         refuse_pending(outputs, {"F875": 1, "F870": 6})
         reported = intended_of(here, outputs, "FA01=60")
         assert "F870 and F871 were set before" in reported.follows

@@ -17,7 +17,7 @@ def watched(made: Bench) -> Recorder:
 
 
 def speed(made: Bench) -> float:
-    """What Monitor shows, in Hz."""
+    """Value on Monitor, in Hz."""
     assert made.console.latest is not None
     return reading_of(made.console.latest.readings["RFR"]).number or 0.0
 

@@ -1,4 +1,4 @@
-"""A drive whose fault is told by a word of its own, beside a status word that knows none."""
+"""A drive with a separate fault word, and a status word without a fault."""
 
 from __future__ import annotations
 
@@ -122,7 +122,7 @@ def test_status_and_run_report_the_same_refusal() -> None:
 
 
 async def test_fault_word_does_not_block_a_stop() -> None:
-    """What needs standstill goes by the status word where that says that the motor is enabled."""
+    """Settings that need standstill follow the status word if it says that the motor is enabled."""
     made = access(OwnDrive(held(RUNNING, 5)))
     session = made.session
     readings = await Reader(session).read(["STAT", "TRIP"])

@@ -1,4 +1,4 @@
-"""Whether anybody is at an address, and then who: by the fewest requests."""
+"""Detection of a drive at an address with minimal requests, then its identification."""
 
 from __future__ import annotations
 

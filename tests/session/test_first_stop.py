@@ -52,7 +52,7 @@ async def test_first_stop_stops_each_family_before_identification(
     assert family in {profile.id for profile in sent.taken.families}
     assert 43 not in {frame[1] for frame in frames(line)}
     await wait_for(lambda: simulation.drive(1).motor.frequency == 0)
-    # whoever was named wrongly was ruled out by its status word, or heard nothing
+    # a wrongly named family is excluded by its status word, or gets no word
     assert writes(line)[-1] == WORDS[family]
     others = {address for address, _ in writes(line)} - {WORDS[family][0]}
     assert others <= ({8501} if named == "atv312" else set())

@@ -1,4 +1,4 @@
-"""The gateway on simulated drives: what reaches them, what is refused, and who stops whom."""
+"""The gateway on simulated drives: forwarded and refused requests, and stops of clients."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ PANEL = Program("panel's id", "panel", 4711)
 
 @dataclass(slots=True)
 class Bench:
-    """A gateway on one line, asked by one client."""
+    """A gateway on one line with one client."""
 
     simulation: Simulation
     line: Line
@@ -70,7 +70,7 @@ class Bench:
         return answer[1] if answer[0] & 0x80 else 0
 
     def written(self) -> list[tuple[int, int]]:
-        """What went out to any drive: register and first word."""
+        """Writes to any drive: register and first word."""
         found = []
         for frame in self.line.trace:
             if frame.direction == "out" and frame.data[1] in (6, 16, 23):
@@ -86,7 +86,7 @@ Make = Callable[..., Bench]
 
 @pytest_asyncio.fixture
 async def bench(start: Start, journal: Journal) -> AsyncIterator[Make]:
-    """A gateway with these rules, on an Altivar 71 at address 1 unless told otherwise."""
+    """A gateway with these rules (default: on an Altivar 71 at address 1)."""
     gateways: list[Gateway] = []
 
     def make(*specs: DriveSpec, profiles: Mapping[int, str] = NONE_NAMED, **rules: object) -> Bench:
@@ -350,7 +350,7 @@ async def test_disconnected_client_commands_nothing_and_is_reported(bench: Make)
 async def test_stop_of_a_disconnected_client_is_sent_but_no_command(
     bench: Make,
 ) -> None:
-    """Nobody would stop the motor: it waited behind another write, or for the drive."""
+    """The stop did not reach the motor: it waited behind another write, or for the drive."""
     made = bench(commands=True, writes=allowed_codes("ACC"))
     made.client.left = True
     assert await made.write(LFR, 300) == 6
@@ -422,7 +422,7 @@ async def test_repeated_run_word_does_not_undo_a_stop_of_another_client(
     assert len(made.written()) == sent
     made.client = operator
     assert await made.write(LFR, 100) == 0
-    made.client = TcpClient(3, "10.0.0.9:5001")  # one that connects anew for each request
+    made.client = TcpClient(3, "10.0.0.9:5001")  # a client that reconnects for each request
     assert await made.write(LFR, 110) == 0
     made.client = controller
     assert await made.write(CMD, 0x0007) == 0  # it has seen the stop
@@ -465,7 +465,7 @@ async def test_recent_value_is_not_read_again(bench: Make) -> None:
     count = len(made.line.trace)
     assert await made.read(ETA, 2) == first
     assert await made.read(ETA + 1, 1) == first[1:]  # type: ignore[index]
-    # beside these only who the drive is is asked
+    # besides these only identification is sent
     assert not [frame for frame in made.line.trace[count:] if frame.data[1] == 3]
 
 

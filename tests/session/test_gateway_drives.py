@@ -1,4 +1,4 @@
-"""Which drive a gateway takes to be behind a device, when its line is lost meanwhile."""
+"""Drive that a gateway assumes at a device after its line was lost."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How soon a stop word of a Modbus TCP client is on the wire, by the record of the drives."""
+"""Delay of a stop word of a Modbus TCP client to the wire, by the record of the drives."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ class Wire:
         assert (await self.ask(struct.pack(">BHH", 3, address, 1)))[0] == 3
 
     def requests(self) -> list[bytes]:
-        """Function, address and word of each request that has come to the drives."""
+        """Function, address and word of each request that reached the drives."""
         return [exchange.request[1:6] for exchange in self.recording.exchanges]
 
     async def known(self) -> None:
-        """A client has asked for the drive, and it was found out which it is."""
+        """A client has requested the drive, and it is identified."""
         chart = struct.pack(">BHH", 3, CHCF, 1)
         while chart not in self.requests():
             await self.read(ETA)
@@ -198,10 +198,10 @@ async def test_stop_does_not_wait_for_the_read_of_another_stop() -> None:
 
 
 async def test_flood_of_other_words_leaves_time_for_polls_and_stops(wire: Wire) -> None:
-    """What is read for each of them goes before polls only as long as few were in vain."""
+    """Reads for each of them precede polls only as long as few were in vain."""
     await wire.known()
     wire.client.host = "10.0.0.9"
-    halt = struct.pack(">BHH", 6, CMD, 0x010F)  # stops in some states only, not in that of now
+    halt = struct.pack(">BHH", 6, CMD, 0x010F)  # stops in some states only, not in the current one
 
     async def flood() -> None:
         while True:

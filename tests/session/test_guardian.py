@@ -1,4 +1,4 @@
-"""Motors of programs that are gone: stopped by who owns the line, unless somebody takes them."""
+"""Motors of exited programs: stopped by the owner of the line, unless taken over."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ class Bench:
         return self.simulation.drive(device).motor.frequency > 1
 
     async def stopped(self, device: int) -> None:
-        """Wait until the motor stands, not by a trip, and its record is gone."""
+        """Wait until the motor is at standstill, without a trip, and its record is removed."""
         drive = self.simulation.drive(device)
         await come(lambda: drive.motor.frequency == 0)
         assert drive.fault is None
@@ -164,7 +164,7 @@ async def test_motors_of_a_killed_program_are_stopped_immediately(
     await bench.stopped(1)
     assert bench.reported[0] == (1, "run on pts/3 (pid 900002) has exited: its motor is stopped.")
     assert bench.turns(2)
-    # the stop is one for all: what anybody meant for the drive before is void
+    # the stop counts for all programs: their pending writes to the drive are cancelled
     assert bench.line.facts.stops.stamp(1) >= 1
     assert bench.line.facts.stops.stamp(2) == 0
 
@@ -172,7 +172,7 @@ async def test_motors_of_a_killed_program_are_stopped_immediately(
 async def test_motor_of_another_user_of_the_group_is_stopped(
     bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A service owns the line as a user of its own, and asks the drive on."""
+    """A service of another user owns the line, and keeps polling the drive."""
     (tmp_path / "group").mkdir()
     ours = bench.starts
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "theirs"))
@@ -266,13 +266,13 @@ async def test_recorder_waits_for_an_attached_panel_only(
     assert bench.says("unless you take it over") is waits
 
 
-# A program that lives: frozen, or gone from the line by itself
+# A living program: frozen, or detached from the line
 
 FROZEN = Program("frozen", "run", LIVING)
 
 
 async def frozen(bench: Bench, *, person: bool = True, **started: bool) -> None:
-    """A program that runs a motor gives no sign of life, and was let go."""
+    """A program that runs a motor sends no heartbeat, and was disconnected."""
     bench.started(1, pid=LIVING, timeout=10.0, **started)
     await come(lambda: bench.turns(1))
     bench.guardian(person=person)
@@ -306,7 +306,7 @@ async def test_person_has_the_drive_timeout_to_take_over_from_a_frozen_program(
     assert bench.line.facts.stops.stamp(1) == 0
     bench.clock.advance(max(0.0, let_go + 10.1 - SILENT_CLIENT - bench.clock.monotonic()))
     await come(lambda: bench.line.facts.stops.stamp(1) > 0)
-    # it had been silent for some of that time before it was let go
+    # it was silent for a part of that time before it was disconnected
     assert bench.clock.monotonic() - let_go < 10.0
     drive = bench.simulation.drive(1)
     await come(lambda: drive.motor.frequency == 0)

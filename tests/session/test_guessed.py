@@ -1,4 +1,4 @@
-"""Drives whose family is a guess: sent a stop word all the same, and never told as stopped."""
+"""Drives of a guessed family: a stop word is sent, and they are never reported as stopped."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ __all__ = ["journal", "start"]
 LEROY_SOMER = ("powerdrive", "proxidrive", "varmeca")
 PUMP = Path(__file__).parent.parent / "drive" / "pump.toml"
 STATUS, COMMAND = 1039, 641
-"""Where the drives that identify nothing have their status word and their command word."""
+"""Status register and command register of drives without identification."""
 
 
 def nameless(*candidates: str) -> DriveIdentity:
@@ -55,7 +55,7 @@ async def test_stop_of_a_guessed_drive_sends_its_word_and_reports_not_stopped(
     # nor does what is read by that guess afterwards take it off the screen
     session.rest_seen = time.monotonic()
     assert is_not_stopped(report, session, report.since + 1)
-    # the same profile, named: the same drive is told as stopped
+    # the same profile, named: the same drive is reported as stopped
     again = DriveSession(line, 1, library.load("powerdrive"), nameless(*LEROY_SOMER))
     console = fleet.take(again)
     assert console.session is session

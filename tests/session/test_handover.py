@@ -1,4 +1,4 @@
-"""Who commands a drive when two programs want to: a question, its answer, and what it means."""
+"""Command of a drive that two programs request: a question, its answer, and the effect."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ async def test_stop_by_another_program_ends_arming_and_work_and_is_reported(benc
     assert bench.session.arming.armed
 
 
-# Asked here
+# Requests to this program
 
 
 async def test_request_is_shown_and_answered_by_a_person(bench: Bench) -> None:
@@ -298,7 +298,7 @@ async def test_motor_not_taken_over_is_stopped_at_the_exit(bench: Bench) -> None
     assert bench.starts.stopped_by_others(1)
 
 
-# Asked elsewhere
+# Requests to another program
 
 
 async def test_drive_of_another_commander_does_not_run(
@@ -307,7 +307,7 @@ async def test_drive_of_another_commander_does_not_run(
     bench.session.note_command()
     bench.starts.begin(bench.session, "forward")
     commanded_there(bench)
-    assert bench.session.commanded  # its motor was started here, and is not known to stand
+    assert bench.session.commanded  # its motor was started here, and its standstill is not known
     bench.facts.note_commander(1, None)
     bench.starts.give_away(bench.session)
     commanded_there(bench)
@@ -364,7 +364,7 @@ async def test_arrivals_and_commanders_are_reported_once(bench: Bench) -> None:
 async def test_earlier_program_that_disappears_is_reported(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The motor that it leaves is looked for, whoever came to the line first."""
+    """The motor that it leaves is followed, whichever program opened the line first."""
     line = FakeLine({1: {}})
     line.facts.set_programs((line.facts.me, REMOTE))
     starts, looked = StartKeeper("panel"), asyncio.Event()

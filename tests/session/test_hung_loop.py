@@ -33,14 +33,14 @@ class NeverBegins:
 
 
 class HungLine(FakeLine):
-    """A line whose loop does not come to new work."""
+    """A line whose loop accepts no new work."""
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
         return NeverBegins()
 
 
 def stopped(line: FakeLine) -> Heard:
-    """What other programs hear of a stop of all drives."""
+    """Notices of other programs about a stop of all drives."""
     voice = line.facts.voice = Heard()
     stopper = Stopper(line, Journal())
     stopper.stop([DriveSession(line, drive, library.load("atv71")) for drive in DRIVES])

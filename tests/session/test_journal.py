@@ -1,4 +1,4 @@
-"""The journal: nobody waits for its disk, nothing is lost while it can be kept."""
+"""The journal: no caller waits for its disk, and no entry is lost while it can be kept."""
 
 from __future__ import annotations
 
@@ -82,13 +82,13 @@ def journal(disk: Disk, tmp_path: Path) -> Iterator[Journal]:
 
 
 def entry(number: int) -> Entry:
-    """An entry that is told from others by its new value."""
+    """An entry that is recognized by its new value."""
     text = str(number)
     return Entry("now", "line", 1, "atv71", "ACC", 9001, 0, "0", number, text, "ok", number, "test")
 
 
 def threads(disk: Disk) -> list[threading.Thread]:
-    """The threads of this test's journals; one that another test has left is none of them."""
+    """Threads of this test's journals, without those of other tests."""
     return [thread for thread in _journals() if thread not in disk.others]
 
 
@@ -97,7 +97,7 @@ def _journals() -> list[threading.Thread]:
 
 
 def kept(journal: Journal) -> list[int]:
-    """What the file holds, in its order."""
+    """Content of the file, in its order."""
     lines = journal.path.read_text("utf-8").splitlines()
     return [json.loads(line)["new_raw"] for line in lines]
 
@@ -199,12 +199,12 @@ def test_unwritable_folder_is_reported(
     wait_until(lambda: bool(made.trouble), "it is told")
     assert made.trouble.startswith("The journal cannot be written: ")
     assert "the journal cannot be written" in caplog.text
-    # who waits is told as soon as the disk refuses again
+    # waiting callers are notified once the disk refuses again
     assert not made.flush(PATIENCE * 10)
     assert not made.close(PATIENCE * 10)
     wait_until(lambda: not threads(disk), "nobody tries any more")
     assert [item.new_raw for item in made.recent] == [1]
-    # the person mends it
+    # the disk is repaired
     (tmp_path / "file").unlink()
     made.add(entry(2))
     assert made.close(PATIENCE)
@@ -218,7 +218,7 @@ def refusing(disk: Disk, tmp_path: Path) -> tuple[Callable[[], None], Callable[[
 
 
 def full(disk: Disk, tmp_path: Path) -> tuple[Callable[[], None], Callable[[], None]]:
-    """A file that takes nothing: a folder stands in its place."""
+    """A file that cannot be written: a folder has its name."""
     aside, path = tmp_path / "aside", tmp_path / "state" / journal_file.JOURNAL_NAME
 
     def breaks() -> None:
@@ -250,7 +250,7 @@ def test_recovered_disk_gets_the_missed_entries(
     wait_until(lambda: bool(journal.trouble), "it is told")
     assert not journal.flush(PATIENCE)
     mended()
-    # nobody has to ask for it
+    # it happens without a request
     wait_until(lambda: journal.trouble == "" and journal.flush(), "it is written")
     assert kept(journal) == list(range(6))
     assert [item.new_raw for item in entries_of(journal, "line", 1)] == list(range(6))
@@ -272,7 +272,7 @@ def test_events_beyond_the_limit_are_lost_and_counted(
     wait_until(lambda: "7 entries lost" in journal.trouble, "it is told")
     disk.refuses = False
     wait_until(lambda: journal.trouble == "" and journal.flush(), "it is written")
-    # one that was given up may stand there, its flush failed
+    # an abandoned one may be there, its flush failed
     assert [number for number in kept(journal) if number >= 7] == [7, 8, 9, 10, 11]
     assert journal.lost == 7
     assert "7 lost" in caplog.text

@@ -162,7 +162,7 @@ def test_files_are_rotated_by_one_program_at_a_time(
     other = os.open(tmp_path, os.O_RDONLY)
     try:
         fcntl.flock(other, fcntl.LOCK_EX)
-        file.append('{"two": 2}')  # waits for nobody for long
+        file.append('{"two": 2}')  # never waits long
         assert file.path.read_text() == '{"one": 1}\n{"two": 2}\n'
     finally:
         os.close(other)
@@ -242,7 +242,7 @@ def test_journal_is_private_to_its_owner(tmp_path: Path) -> None:
     assert stat.S_IMODE(journal.path.stat().st_mode) == 0o600
     for folder in (journal.path.parent, journal.path.parent.parent):
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
-    # one that others could read so far
+    # one that others could read before
     journal.path.chmod(0o644)
     tmp_path.joinpath("some").chmod(0o755)
     journal.add(entry(2))

@@ -1,4 +1,4 @@
-"""What is read of a journal of any content: every entry that is whole, and what is not."""
+"""Journals of any content: every whole entry is read, everything else is reported."""
 
 from __future__ import annotations
 
@@ -125,5 +125,5 @@ def test_entries_are_selected_by_drive_line_and_time() -> None:
     # however it was typed
     assert numbers(line="tcp:HOST") == [1, 2]
     assert numbers(line="tcp:host", device=1) == [1]
-    # what cannot be told is kept
+    # undecidable entries are kept
     assert numbers(since=datetime(2026, 3, 1, 9, tzinfo=UTC)) == [2, 3, 4]

@@ -52,7 +52,7 @@ def on(path: str) -> FakeLine:
 
 
 def known(line: FakeLine, *drives: DriveIdentity, profile: str = "") -> KnownLine:
-    """The line, opened anew, with the drives that answered."""
+    """The line, reopened, with the drives that answered."""
     found = KnownLine(line)
     for drive in drives:
         found.note(drive, drive.device, profile)
@@ -78,7 +78,7 @@ def test_other_adapter_under_the_same_name_holds_the_line(adapters: Adapters) ->
     assert "B7" in reported
     assert reported in line.held
     assert "--accept-line" in line.held
-    # it is not remembered before somebody has said that it is right
+    # it is not stored before a person has confirmed it
     assert known(on(adapters.port("ttyUSB0"))).changed == (reported,)
     found.accept()
     assert line.held == ""

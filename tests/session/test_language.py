@@ -1,4 +1,4 @@
-"""What a profile can say of registers: input registers, fields of a word, word order, memory."""
+"""Register features of profiles: input registers, fields of a word, word order, memory."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ async def test_field_write_keeps_the_other_fields(journal: Journal) -> None:
     await writer.write_parameter(FIELDS["LOW"], 0, why="setting")
     assert line.registers[10] == 0x8060
     assert session.image.raws["LOW"] == 0
-    line.registers[10] = 0x1F00  # somebody else wrote meanwhile: theirs stays
+    line.registers[10] = 0x1F00  # another master wrote in the meantime: its value stays
     await writer.write_parameter(FIELDS["TOP"], 1, why="setting")
     assert line.registers[10] == 0x9F00
     with pytest.raises(ValueRefused, match="does not fit"):

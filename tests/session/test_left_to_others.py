@@ -1,4 +1,4 @@
-"""What is said of a motor that is left on a line which other programs share."""
+"""Text about a motor that is left running on a line shared with other programs."""
 
 from __future__ import annotations
 

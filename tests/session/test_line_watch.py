@@ -1,4 +1,4 @@
-"""Looking after a drive that watches the line: asked in time, before the polls, and told of."""
+"""Keeping drives with a timeout alive: read in time, before polls, and reported."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ PROFILE = profile_of(
 
 
 class HeardLine(OneDrive):
-    """Knows with which priority the drive was asked, and keeps its workers."""
+    """Record the priority of reads of the drive, and keep its workers."""
 
     def __init__(self, tenths: int) -> None:
         super().__init__({STATE: 1, TIME_OUT: tenths})
@@ -52,7 +52,7 @@ class HeardLine(OneDrive):
         self.looked: list[tuple[int, Priority]] = []
         self.workers: list[LineWorker] = []
         self.answers = asyncio.Event()
-        """Whether polls are answered by now."""
+        """True if polls are answered by now."""
         self.answers.set()
 
     async def before_read(self, device: int, registers: range, priority: Priority) -> None:
@@ -107,7 +107,7 @@ async def keep() -> AsyncIterator[Callable[[int], Kept]]:
 
 
 def kept_alive(line: HeardLine) -> list[KeepAlive]:
-    """What the holder of the line is to keep alive."""
+    """Devices that the holder of the line keeps alive."""
     return line.facts.keep_alives.of(line.facts.me.id)
 
 

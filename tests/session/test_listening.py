@@ -1,4 +1,4 @@
-"""What others say on a line, told by drives, codes and values, and summed up."""
+"""Traffic of other masters, decoded by drives, codes and values, and summarized."""
 
 from __future__ import annotations
 

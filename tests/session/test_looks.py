@@ -1,4 +1,4 @@
-"""What the looks at the drives of a line tell, also of one that is not heard any more."""
+"""Snapshots of the drives of a line, including silent ones."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ async def test_scanner_changed_between_reads_never_mixes_values() -> None:
                 here.drive.set(slot, raw)
 
         async def read(device: int, address: int, count: int = 1, **how: object) -> Reply:
-            # somebody else writes the slots at every second read, wherever that falls
+            # another master writes the slots at every second read, wherever that is
             if next(changes) % 3:
                 change()
             return await honest(device, address, count, **how)  # type: ignore[arg-type]
@@ -193,7 +193,7 @@ async def test_one_comparison_does_not_confirm_but_a_monitor_may() -> None:
 
 
 async def test_slots_changed_between_comparisons_are_not_confirmed() -> None:
-    # at rest, where all values are zero and nothing can be told
+    # at standstill, where all values are zero and cannot be distinguished
     with bench("atv21", sets=READ_BLOCK) as here:
         line, honest, reads = here.session.line, here.session.line.read, itertools.count()
 

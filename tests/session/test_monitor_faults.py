@@ -22,7 +22,7 @@ from tui.session.shown import Quality
 from .fakes import OneDrive, parameter, profile_of
 
 Cycles = list[tuple[Snapshot, list[int]]]
-"""Each snapshot with the addresses that were asked for it."""
+"""Each snapshot with the addresses requested for it."""
 STATE, SPEED, REFUSED, FIRST_SLOW = 10, 20, 900, 1000
 SLOW = 12
 RUNNING, FAULT = 1, 2
@@ -64,7 +64,7 @@ class FaultyLine(OneDrive):
         self.fail_read(1, REFUSED, 2)
         self.faults: list[Exception | None] = []
         self.addresses: list[int] = []
-        """What was asked, whether it came or not."""
+        """Requests, answered or not."""
         self.task: asyncio.Task[object] | None = None
 
     async def before_read(self, device: int, registers: range, priority: Priority) -> None:
@@ -81,7 +81,7 @@ class FaultyLine(OneDrive):
 
 
 class Bench:
-    """A monitor, its line, and what was asked in each cycle."""
+    """A monitor, its line, and the requests of each cycle."""
 
     def __init__(self) -> None:
         self.line = FaultyLine()
@@ -193,7 +193,7 @@ async def test_values_are_stale_after_three_failed_cycles(bench: Bench) -> None:
         stale = reading.quality is Quality.STALE
         assert stale is (snapshot.time - reading.time > 3 * snapshot.period)
     assert reading.quality is Quality.STALE
-    # stale words tell no state
+    # stale words give no state
     assert snapshot.state.kind == "unknown"
 
 

@@ -1,4 +1,4 @@
-"""Another master is heard before anything is sent, and told with what it asks of whom."""
+"""Another master is detected before anything is sent, and reported with its requests."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ async def test_snapshot_without_a_following_cycle_becomes_stale() -> None:
 
 
 async def test_arming_requires_a_current_state() -> None:
-    """With a monitor that stands still, an old state arms nothing; the drive is asked."""
+    """With a paused monitor, an old state arms nothing; the drive is read."""
     async with bench("atv71") as here:
         here.console.monitor.stop()
         await until(lambda: here.session.state(1.0).kind == "unknown")
@@ -225,7 +225,7 @@ async def test_stop_ends_parameter_writing_before_the_next_frame() -> None:
         assert at < staged
         assert not here.session.arming.armed
         assert len(editor.staging.edits) >= staged - at
-        # of the one that was on the wire the drive itself is asked
+        # for the request that was on the wire, the drive is read
         await until(lambda: all(here.drive.raw(e.code) == e.old for e in editor.staging.edits))
         assert len(editor.staging.edits) < staged
 

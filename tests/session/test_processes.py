@@ -1,4 +1,4 @@
-"""Whether a program lives: real programs, and those that a made-up /proc shows."""
+"""Detection of living programs: real ones, and those of a made-up /proc."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an indirect block brings is told by its words: never wrongly, and soon where it can be."""
+"""Assignment of an indirect block, identified by its words: never wrongly, and soon if possible."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def compared(
     now = 0.0
 
     def raw(code: str) -> int:
-        """What the drive holds now: at the end of its range a value stays there."""
+        """Current values of the drive: at the end of its range a value stays."""
         low, high = type_range(PROFILE[code])
         return min(max(low, signal[code].at(now, chance)), high)
 
@@ -109,7 +109,7 @@ def test_replacement_for_an_assignment_is_reported() -> None:
     assert {proof.brings(slot) for slot in BLOCK.slots} == {CODES[2]}
     excluded = [slot for slot, code in CHOSEN.items() if proof.excludes(slot, RAWS[code])]
     assert excluded == [slot for slot in BLOCK.slots if slot != "F877"]
-    # those that are alike cannot be told from each other, but from what was chosen
+    # equal values cannot be distinguished from each other, but from the assigned one
     alike = APART | {CODES[5]: APART[CODES[2]]}
     proof = compared(behind, alike, 3, random.Random(1), CHOSEN)
     assert proof.brings("F875") == ""
@@ -203,7 +203,7 @@ def test_only_true_assignments_are_confirmed(
     proof = compared(real, given, rounds, chance, wanted)
     for slot, code in real.items():
         assert proof.brings(slot) in ("", code), (slot, code)
-        # one that trembles may miss its own two readings by chance: its place is not used then
+        # a fluctuating value may miss its own two readings by chance: its slot is not used then
         assert given[code].noise or not proof.excludes(slot, RAWS[code]), (slot, code)
         for other in CODES:
             if other != code:

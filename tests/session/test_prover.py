@@ -1,4 +1,4 @@
-"""A drive is left alone for longer and longer until it reacts, and what that tells."""
+"""Polling of a drive pauses for longer and longer until it reacts, and the result."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ EXCHANGE = 0.01
 
 
 class OwnTime(Clock):
-    """Time that goes by only where somebody sleeps."""
+    """Time that advances only during sleeps."""
 
     now = 1000.0
 
@@ -51,7 +51,7 @@ class OwnTime(Clock):
 
 
 class WatchingDrive(OneDrive):
-    """An Altivar 312 that trips when nobody has asked it for `timeout` seconds."""
+    """An Altivar 312 that trips after `timeout` seconds without a request."""
 
     def __init__(self, clock: OwnTime, timeout: float, *, held: float | None = None) -> None:
         super().__init__(dict.fromkeys(range(0x10000), 0))
@@ -198,7 +198,7 @@ async def test_polling_is_paused_during_the_test_and_resumes() -> None:
                 await drive.read(1, STATUS)
             refused += 1
     assert refused
-    # what is set is read before it is left alone, where everybody else asks, too
+    # the setting is read before polling is paused, while all programs still poll
     alone = drive.priorities[drive.priorities.index(Priority.STOP) :]
     assert set(alone) == {Priority.STOP}
     await drive.read(1, STATUS)

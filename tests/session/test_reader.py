@@ -57,7 +57,7 @@ async def test_refused_word_is_not_polled_again() -> None:
 
 
 async def test_word_that_may_mean_no_value_is_read_alone() -> None:
-    """16#8000 in a block may be a value or may mean none: only a single read tells."""
+    """16#8000 in a block may be a value or mean none: only a single read shows it."""
     profile = profile_of(
         *(parameter(f"P{a}", a) for a in (8400, 8401, 8402)),
         reading={"unknown_word": 0x8000, "unknown_exception": 2},
@@ -139,7 +139,7 @@ async def test_only_numeric_percentages_are_converted_to_their_rating() -> None:
 
 @pytest.mark.parametrize("priority", [Priority.POLL, Priority.OPERATOR_READ])
 async def test_every_value_read_is_stored_for_the_drive(priority: Priority) -> None:
-    """What Monitor polls is what parameters, commands and stops go by."""
+    """Values polled by Monitor are used for parameters, commands and stops."""
     line = OneDrive({10: 7, 11: 8})
     session = DriveSession(line, 1, profile_of(parameter("A", 10), parameter("B", 11)))
     await Reader(session).read(["A", "B"], priority=priority)

@@ -1,4 +1,4 @@
-"""A fault reset of an Altivar 21: its words of the line go back to 0, and that is told before."""
+"""Fault reset of an Altivar 21: its words of the line return to 0, with a prior warning."""
 
 from __future__ import annotations
 

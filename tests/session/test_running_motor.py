@@ -326,7 +326,7 @@ def test_signal_handled_by_the_script_is_left_to_it(
 
 
 def test_signal_stops_motors_of_nested_blocks_together() -> None:
-    """The outer one does not turn on until the inner one has come to rest."""
+    """The outer motor does not run on until the inner one is at standstill."""
     specs = [
         DriveSpec("atv71", 1, sets={"ACC": RAMP, "DEC": RAMP}),
         DriveSpec("atv71", 2, sets={"ACC": RAMP, "DEC": 100}),

@@ -37,7 +37,7 @@ from tui.simulator import DriveSpec, Simulation
 
 @dataclass
 class Replies:
-    """A line on which these addresses answer, some only when they are asked once more.
+    """A line on which these addresses answer, some only on a second request.
 
     The read that finds them is refused, as by a drive that has no such word.
     """
@@ -52,7 +52,7 @@ class Replies:
     facts: SharedState = field(default_factory=SharedState)
     heard_late: set[int] = field(default_factory=set)
     waits: list[float | None] = field(default_factory=list)
-    """How long each answer was waited for that did not come."""
+    """Wait for each missing reply."""
     counters: LineCounters = field(default_factory=LineCounters)
 
     def device_state(self, device: int) -> DeviceState:
@@ -81,21 +81,21 @@ class Replies:
         raise NoAnswer(device, 3, address)
 
     async def no_time(self, _seconds: float) -> None:
-        """In place of a rest."""
+        """Replaces a pause."""
 
     def background(self) -> list[int]:
-        """Who was asked in the first round."""
+        """Addresses probed in the first round."""
         return [device for device, priority in self.requested if priority is Priority.BACKGROUND]
 
     def patiently(self) -> list[int]:
-        """Who was asked once more."""
+        """Addresses probed again."""
         return [device for device, priority in self.requested if priority is Priority.PATIENT]
 
 
 async def searched(
     search: Search, line: Replies | ModbusLine, texts: list[str] | None = None
 ) -> list[ScanResult]:
-    """Who was found, and how far it was each time."""
+    """Drives found, and the progress each time."""
     results: list[ScanResult] = []
 
     async def found(result: ScanResult) -> None:
@@ -121,7 +121,7 @@ async def test_single_drive_is_identified_before_profiles_are_read(
     assert result.identity is not None
     assert result.identity.reference == "ATV71HU15M3"
     assert (search.ended, texts) == ("done", ["1 of 1, 1 found"])
-    # nothing else was asked
+    # nothing else was requested
     assert line.requested == []
 
 
@@ -288,7 +288,7 @@ async def test_scan_finds_every_drive_and_no_other() -> None:
     opened = demo_line({"atv21": 35.0, "atv71": 50.0, "powerdrive": 30.0})
     try:
         assert devices(await searched(Search(range(1, 6), patient=True), opened.line)) == [1, 2, 3]
-        # an empty address that was searched is no failure of the line
+        # a scanned empty address is not a line failure
         assert opened.line.counters.timeouts == 0
         assert opened.line.counters.searched > 4
     finally:

@@ -1,4 +1,4 @@
-"""Where programs on one line meet: by device, in a folder of this user, or nowhere."""
+"""Meeting place of programs on one line: by device, in a folder of this user, or none."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_line_works_unshared_if_folder_cannot_be_made(
         first = open_line(f"serial:{peer.path}", wait=5, program="first")
         try:
             assert first.line.facts.voice is None
-            # and a second program is told so, as ever
+            # and a second program is refused as always
             with pytest.raises(PortBusy, match="in use"):
                 open_line(f"serial:{peer.path}", wait=5, program="second")
         finally:

@@ -31,7 +31,7 @@ from tui.simulator import DriveSpec, LineTiming, Simulation
 from .fake_clock import FakeClock
 
 INPUTS = next(b.address for b in library.load("atv71").data.blocks if b.direction == "read")
-"""Where the words of the scanner's inputs begin."""
+"""First register of the scanner's inputs."""
 TRIES = 5
 SCATTERED = {"NCV": 7, "VCAL": 2, "INV": 120, "LSP": 41, "HSP": 523, "ACC": 37, "DEC": 59}
 """Words of an Altivar 71 that lie apart from each other and stay as they are set."""
@@ -94,7 +94,7 @@ def assignment(codes: list[str]) -> dict[str, int]:
 
 
 def requests(monitor: Monitor, codes: Iterable[str]) -> int:
-    """How many requests bring these words."""
+    """Count the requests that return these words."""
     plan = monitor.reader._plans.plan(frozenset(codes), monitor.reader.in_force)
     return len(plan.requests) + len(plan.checks)
 
@@ -148,7 +148,7 @@ class Shared:
         await self.line.read(1, address, count, priority=Priority.POLL, max_age=1e-9)
 
     async def read(self) -> dict[str, int]:
-        """What the reader tells that is not so."""
+        """Values of the reader that are wrong."""
         found = await self.reader.read(self.codes, priority=Priority.POLL)
         good = {
             code: reading.raw for code, reading in found.items() if reading.quality is Quality.GOOD

@@ -1,4 +1,4 @@
-"""What a person is told of a motor that runs, by the record of its start."""
+"""Text about a running motor, from the record of its start."""
 
 from __future__ import annotations
 

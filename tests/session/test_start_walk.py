@@ -1,4 +1,4 @@
-"""Starting a drive that takes its time: each word behind the state before it; its record."""
+"""Start of a slow drive: each word after its state; its record."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ async def test_start_is_on_the_disk_before_the_first_frame(here: SlowBench) -> N
 
 
 async def test_standstill_read_just_after_the_run_word_keeps_the_record(here: SlowBench) -> None:
-    """The state of a slow drive is still the one before its start: the motor runs all the same."""
+    """The state of a slow drive is still the one before its start, but the motor runs."""
     assert (await here.start())[0] is OutcomeKind.DONE
     assert here.line.registers[STATUS] == ENABLED
     assert here.starts.close(5.0)

@@ -69,7 +69,7 @@ class MadeUp(Processes):
 
 
 class Other:
-    """Another program that records starts, told what to do."""
+    """Another program that records starts on command."""
 
     def __init__(self, folder: Path) -> None:
         self.process = subprocess.Popen(
@@ -686,7 +686,7 @@ def test_record_of_another_pid_namespace_is_kept_until_its_program_ends(tmp_path
 
 
 def test_record_of_an_earlier_container_does_not_hide_a_later_start(tmp_path: Path) -> None:
-    """Whether a program of another PID namespace lives is not known: the last start counts."""
+    """The life of a program of another PID namespace is unknown: the last start counts."""
     starts = Starts(tmp_path, processes=MadeUp())
     there = replace(start(pid=ENDED), space="pid:[1]", wall="2026-11-01T10:00:00.000+00:00")
     here = start(pid=ENDED, started="101", wall="2026-11-02T10:00:00.000+00:00")

@@ -49,7 +49,7 @@ class Holder:
         self.refuses = False
         self.answers = True
         self.errors: dict[int, LineError] = {}
-        """What comes for reads that begin at an address."""
+        """Replies to reads that begin at an address."""
         self.without: set[int] = set()
         self.age = 0.0
         self._turn = 0

@@ -58,7 +58,7 @@ def journal() -> Iterator[Journal]:
 
 
 async def ended(stopper: Stopper, device: int, clock: FakeClock | None = None) -> StopReport:
-    """The report of a stop that has ended; with a clock, its time is let go by."""
+    """Report of an ended stop; with a clock, its time is advanced."""
 
     def over() -> bool:
         report = stopper.reports.get(device)
@@ -294,7 +294,7 @@ def test_no_stop_word_runs_a_motor_in_any_state(family: str) -> None:
 
 
 PRESSES = 400
-"""More stops than a drive could be asked between: a key that is held down."""
+"""More stops than reads fit between: a held key."""
 
 
 async def test_held_stop_key_stops(start: Start, journal: Journal) -> None:
@@ -314,7 +314,7 @@ async def test_held_stop_key_stops(start: Start, journal: Journal) -> None:
 
 
 async def test_stop_after_a_command_is_a_separate_stop(start: Start, journal: Journal) -> None:
-    """One that was begun before the drive was armed again does not count for it."""
+    """A stop begun before the drive was armed again does not count for it."""
     _, line = start(DriveSpec("atv71", 1))
     stopper, session = Stopper(line, journal), DriveSession(line, 1, library.load("atv71"))
     stopper.stop([session])

@@ -43,9 +43,9 @@ ROOMS = (
     "tui.bus",
     "tui.wire",
 )
-"""Of the functions of each of these, those that stand in none before it."""
+"""Functions of each of these that are in none before it."""
 BOTTOM = {"TcpTransport.send"}
-"""Where nothing can be sent at all: by every way the frame comes to this."""
+"""Points without which nothing can be sent: the frame passes them on every path."""
 SOME = 12
 """Every so many functions outside the sweeps, which take all."""
 PARTS = 3
@@ -75,7 +75,7 @@ class Wire:
 
 @pytest.fixture(autouse=True)
 def collected() -> Iterator[None]:
-    """What the errors have left goes with their test: its warnings would fail a later one."""
+    """Leftovers of the errors end with their test: their warnings would fail a later one."""
     yield
     gc.collect()
 
@@ -118,13 +118,13 @@ class Bench:
         self.fleet.take(DriveSession(self.line, 1, library.load(FAMILY)))
 
     def is_witness(self) -> bool:
-        """Whether this thread is another's: the owner's, or that of a simulated drive."""
+        """True if this is a thread of the owner or of a simulated drive."""
         thread = threading.current_thread()
         mine = (threading.main_thread(), self.line._engine._thread)
         return thread not in mine and thread.name != "stops sent"
 
     def press(self) -> float:
-        """What the stop key does; see Hands."""
+        """Action of the stop key; see KeyDispatcher."""
         pressed = time.monotonic()
         try:
             self.fleet.stop(self.fleet.sessions)
@@ -222,7 +222,7 @@ def stopped(made: Bench, place: Place) -> list[str]:
     """Press the stop key; what went wrong then."""
     wire, pressed = made.wire, made.press()
     sent = until(lambda: bool(wire.stops) or made.not_stopped(), FRAME_WITHIN)
-    # the owner may not have come to it yet, or a follow-up failed before the frame was out
+    # the owner may not have reached it yet, or a follow-up failed before the frame was sent
     if wire.stops or (place.name not in BOTTOM and until(lambda: bool(wire.stops), 1.0)):
         return []
     after = made.shown_at - pressed

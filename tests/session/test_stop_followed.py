@@ -25,7 +25,7 @@ LONG_RAMP = 3000
 
 
 class OwnTime(Clock):
-    """Time that passes only while somebody sleeps."""
+    """Time that advances only during sleeps."""
 
     def __init__(self) -> None:
         self.now = 1000.0

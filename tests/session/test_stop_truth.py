@@ -72,7 +72,7 @@ async def test_stop_by_another_program_is_reported_with_its_word() -> None:
 
 @pytest.mark.parametrize(("steps", "ends"), [(40, 500), (-90, 0)])
 async def test_step_beyond_a_limit_reaches_the_limit(steps: int, ends: int) -> None:
-    """40 held Up wrote nothing once the sum lay above HSP."""
+    """40 held Up wrote nothing once the sum exceeded HSP."""
     async with bench("atv71", sets={"HSP": 500, "LSP": 0}) as here:
         commander = here.console.commander
         await here.arm()

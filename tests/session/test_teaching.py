@@ -1,4 +1,6 @@
-"""What is taught of a drive is kept with it, used at once, and ended by a look that disagrees."""
+"""A learned scale is stored with its drive, used immediately, and discarded by a disagreeing
+reading.
+"""
 
 from __future__ import annotations
 
@@ -56,7 +58,7 @@ def kept(folder: Path, ending: str = "json") -> Path:
 
 
 async def shown(teacher: Teacher, code: str = "HZ") -> str:
-    """What the drive's value reads, and its mark."""
+    """Text of the drive's value, and its mark."""
     value = (await Reader(teacher.session).read([code]))[code].value
     assert value is not None
     return f"{value.display}{' taught' if value.taught else ''}"

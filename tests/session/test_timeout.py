@@ -1,4 +1,4 @@
-"""What a drive tells of its communication timeout, and whether that runs."""
+"""Communication timeout of a drive, and detection of whether it runs."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ async def test_timeout_of_a_missing_port_is_read_once() -> None:
 
 
 async def test_word_unanswered_twice_is_not_read_again() -> None:
-    """One lost reply is no missing word; and each silence keeps a drive from being asked."""
+    """One lost reply does not mean a missing word; and each silence delays requests to a drive."""
     clock = FakeClock()
     line = Ports({PORT: 20}, silent=TTO)
     session = session_of(line, clock, other_timeouts=["PORT"])
@@ -179,7 +179,7 @@ async def test_silent_drive_is_reported() -> None:
     [
         (False, 0, False, True),
         (True, 0, False, False),
-        (True, 7, False, True),  # somebody has written a command
+        (True, 7, False, True),  # another master has written a command
         (True, 0, True, True),
     ],
 )

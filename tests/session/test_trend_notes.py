@@ -99,7 +99,7 @@ def test_trend_of_another_family_at_the_address_is_ignored() -> None:
     for note in holder.facts.notes.all:
         following.facts.events.emit(
             NoteReceived(note)
-        )  # another part of the same program asked for it
+        )  # another part of the same program requested it
     following.add(110.0)
     assert following.times == [110.0]
 

@@ -55,7 +55,7 @@ class _Late:
 
 
 class Notified:
-    """A queue of an armed drive, and tasks that tell what became of them."""
+    """A queue of an armed drive, and tasks that report their results."""
 
     def __init__(self) -> None:
         self.line = Loop()
@@ -64,7 +64,7 @@ class Notified:
         self.queue = WorkQueue(self.line, 1, self.arming)
         self.output: list[str] = []
         self.before: dict[str, Outcome | None] = {}
-        """What the work had come to when a task began."""
+        """Results so far when a task began."""
 
     def put(
         self,
@@ -96,7 +96,7 @@ class Notified:
         self.queue.put(Task(carry_out, given_up=given_up, **more), stamp)
 
     async def idle(self) -> list[str]:
-        """What was said, once nothing is being done any more."""
+        """Messages, once the queue is idle."""
         for _ in range(1000):
             await asyncio.sleep(0.01)
             if not self.queue.busy:
@@ -228,7 +228,7 @@ async def test_task_typed_before_a_stop_is_refused_at_entry(reported: Notified) 
     reported.arming.arm()
     with pytest.raises(Stopped, match=r"a stop came after it \(F12\)"):
         reported.put("typed before", stamp=stamp)
-    # one that needs no arming is refused as well
+    # a task that needs no arming is refused as well
     with pytest.raises(Stopped):
         reported.put("typed before", stamp=stamp, armed=False)
     reported.put("typed behind", stamp=reported.queue.stops)
@@ -283,7 +283,7 @@ async def test_permit_ends_with_a_stop_and_stays_ended(reported: Notified) -> No
         assert permit.refusal() == "Not sent: a stop came after it (F12)."
         with pytest.raises(Stopped):
             permit.check()
-        # arming anew lets nothing typed before through
+        # arming again lets nothing typed before pass
         reported.arming.arm()
     with pytest.raises(Stopped):
         reported.queue.permit(permit.stamp)

@@ -34,7 +34,7 @@ PROFILE = profile_of(
 
 
 class WilfulDrive(FakeDevice):
-    """A drive that takes or changes what is written, as a test wants."""
+    """A drive that keeps or changes written values, as the test sets."""
 
     keeps: Callable[[int, int], int] = staticmethod(lambda _address, word: word)
 
@@ -253,7 +253,7 @@ async def test_stop_cancels_a_frame_waiting_for_the_line(
 async def test_slow_drive_is_read_after_its_reply(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
-    """The read-back is asked behind the answer, never beside it."""
+    """The read-back is requested after the reply, never at the same time."""
     order: list[str] = []
     read = line.read
 
@@ -275,7 +275,7 @@ async def test_slow_drive_is_read_after_its_reply(
 
 
 def abilities_in(journal: Journal) -> list[Entry]:
-    """What the journal's files tell, completions apart from what they complete."""
+    """Entries of the journal files, completions separate from the entries they complete."""
     assert journal.flush(60)
     return [entry for entry in read_journal(journal.files) if isinstance(entry, Entry)]
 
@@ -288,7 +288,7 @@ async def test_lost_reply_is_completed_by_a_later_read(
     line.fail_write(1, 10, NoAnswer(1, 6, 10), taken=taken)
     with pytest.raises(NoAnswer):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
-    # whoever reads it, and for whatever reason
+    # any reader, for any reason
     await Reader(session).read(["ACC"])
     await Reader(session).read(["ACC"])
     lost, later = abilities_in(journal)

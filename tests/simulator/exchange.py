@@ -1,9 +1,9 @@
 """Raw exchanges as tests: frames in, frames out, inputs, faults and time between them.
 
-A script has one step a line: `> 02 03 0C81 0001` sends a frame, `< 02 03 02 0237` expects
-a reply, `< -` expects none. Checksums are omitted: they are added to sent frames and checked on
-replies. `@ LI5=1` sets an input of the first drive, `! OCF` trips it, `. 3` lets
-3 s pass. Text after a `#` is a comment.
+A script has one step per line: `> 02 03 0C81 0001` sends a frame, `< 02 03 02 0237` expects a
+reply, `< -` expects none. Checksums are omitted: they are added to sent frames and checked on
+replies. `@ LI5=1` sets an input of the first drive, `! OCF` trips it, `. 3` lets 3 s pass. Text
+after a `#` is a comment.
 """
 
 from __future__ import annotations

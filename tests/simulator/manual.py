@@ -122,7 +122,7 @@ def _altivar_31_312() -> list[Example]:
     for profile, first in (("atv31", 32), ("atv312", 40)):
         spec = _drive(profile, 2, _SPEEDS, identity=_OLD_IDENTITY)
         examples += [Example(number, number + 1, spec) for number in range(first, first + 6, 2)]
-    # 4043 and 4044 are no parameters (ACC and DEC are 9001 and 9002): the checksums are right,
+    # 4043 and 4044 are not parameters (ACC and DEC are 9001 and 9002): the checksums are right,
     # so a drive understands the request, and refuses the addresses.
     examples.append(Example(38, None, _drive("atv31", 2), answer="029002"))
     examples.append(Example(46, 47, _drive("atv312", 2)))

@@ -1,4 +1,4 @@
-"""Who commands an Altivar and who gives its reference: raw exchanges, as the manuals draw it."""
+"""Command and reference sources of an Altivar: raw exchanges, as the manuals show."""
 
 from __future__ import annotations
 

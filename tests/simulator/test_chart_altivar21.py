@@ -13,7 +13,7 @@ UNWATCHED = {"F803": 0}
 
 
 def started() -> Bench:
-    """A drive that was told to run at 30.00 Hz."""
+    """A drive commanded to run at 30.00 Hz."""
     bench = Bench("atv21", UNWATCHED)
     bench.taken("FA01", 3000)
     bench.taken("FA00", RUN_FORWARD)

@@ -88,7 +88,7 @@ def library_drive(**sets: int) -> SimulatedDrive:
 
 
 def written(drive: SimulatedDrive, code: str, word: int) -> bool:
-    """Whether the drive took a word of the line."""
+    """Return True if the drive accepted a word of the line."""
     pdu = struct.pack(">BHH", 6, drive.profile[code].address, word)
     return drive.line_side.answer(1, pdu) == pdu
 

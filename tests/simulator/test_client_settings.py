@@ -25,7 +25,7 @@ from .test_manual_frames import read
 REQUEST = seal(bytes.fromhex("020323290001"))
 REPLY = seal(bytes.fromhex("020302001E"))
 LONG_ENOUGH = 0.5
-"""Seconds without a byte after which nobody has answered."""
+"""Seconds without a byte after which no reply is expected."""
 
 
 @contextmanager

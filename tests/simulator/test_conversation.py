@@ -1,4 +1,4 @@
-"""Where frames end, and when replies are on the wire; with a clock of the test's own."""
+"""Ends of frames, and times of replies on the wire; with the clock of the test."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def conversation(
 
 
 def everything(talk: RtuConversation, until: float) -> list[tuple[float, bytes]]:
-    """What is written, and when, if the endpoint comes back exactly when it has to."""
+    """Written bytes and their times, if the endpoint is called exactly when due."""
     written = []
     while (due := talk.due) is not None and due <= until:
         if out := talk.poll(due):

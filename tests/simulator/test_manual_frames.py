@@ -1,6 +1,6 @@
-"""Every example frame of the manuals, byte for byte: asked directly and over a terminal.
+"""Every example frame of the manuals, byte for byte: sent directly and over a pseudo-terminal.
 
-A frame whose checksum is misprinted gets no answer; with the right checksum it does.
+A frame with a misprinted checksum gets no reply; with the right checksum it does.
 """
 
 from __future__ import annotations

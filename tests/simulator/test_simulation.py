@@ -1,4 +1,4 @@
-"""The line served for real: terminal, TCP, an opened port; plugs pulled; real time kept."""
+"""The line served in reality: pseudo-terminal, TCP, an open port; unplugged; in real time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a terminal can show, as its environment tells it; what stands for what it cannot."""
+"""Abilities of a terminal by its environment, and replacements for missing ones."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def test_erasing_is_used_only_with_background_color_erase(term: str) -> None:
 
 
 def abilities_in(environment: dict[str, str]) -> Abilities:
-    """What is found in a process of its own: terminfo is looked at once in each."""
+    """Result in a separate process: terminfo is read once in each."""
     code = (
         "import sys, pickle; from tui.terminal.abilities import abilities_of;"
         f"sys.stdout.buffer.write(pickle.dumps(abilities_of({environment!r})))"

@@ -37,7 +37,9 @@ def cuts(text: str, most: int = 2) -> Iterator[list[str]]:
 
 
 def tokens(reads: Sequence[str], gap: float = 0.0, *, mouse: bool = False) -> list[Token]:
-    """What reads come to, so many seconds apart, and when all that waited is over."""
+    """Result of reads with pauses of this many seconds, and the time when all that waited is
+    delivered.
+    """
     tokenizer, found, now = Tokenizer(mouse=mouse), list[Token](), 0.0
     for read in reads:
         found += tokenizer.tick(now)
@@ -169,7 +171,7 @@ SENT_BEFORE = [*REPLIES.values(), *REPORTS.values(), "\x9d11;rgb:0/1\x9c", "\x90
 
 @pytest.mark.parametrize("reply", SENT_BEFORE)
 def test_stop_key_after_a_cut_or_incomplete_reply_stops(reply: str) -> None:
-    """The backslash of ESC \\ is lost or late: ESC and the ESC of F12 are no Alt, and no key."""
+    """The end of a report, a backslash, is lost or late: ESC and the ESC of F12 are no key."""
     for kept in sorted({len(reply) - lost for lost in range(4)} | {1, 2, 3}):
         for stop, key in STOP_SEQUENCES.items():
             whole = reply[:kept] + stop
@@ -390,7 +392,7 @@ def test_unterminated_paste_ends_after_a_while_without_typing(end: str) -> None:
 
 ACTS = {"r", "v", "enter"}
 TYPED = (string.digits + string.ascii_letters + string.punctuation).translate({92: None, 126: None})
-"""What a person types, but for what ends a reply or brackets a paste."""
+"""Typed input, except for ends of replies and brackets of pastes."""
 SEQUENCES = st.builds(
     lambda begin, middle, final: begin + middle + final,
     st.sampled_from(["\x1b[", "\x1bO", "\x1b[[", "\x1b\x1b[", "\x9b"]),
@@ -400,7 +402,7 @@ SEQUENCES = st.builds(
 
 
 def _is_more_than_one_sequence(sequence: str) -> bool:
-    """Whether it is a key that came as the number of its character, Enter of the keypad, or two."""
+    """True if the key was sent by its character number, is Enter of the keypad, or is two keys."""
     body = sequence.replace("\x1b\x1b[", "\x1b[").replace("\x9b", "\x1b[")
     rxvt_reply = re.match(r"\x1b\[\d{1,2}\$.", body)
     return bool(body.endswith("u") or body.startswith("\x1b[27;") or body == "\x1bOM" or rxvt_reply)

@@ -163,7 +163,7 @@ def test_stop_between_read_and_stamp_cancels_the_keys(
 def test_lost_terminal_ends_the_panel_with_a_hangup(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """SIGHUP goes to who leads the session alone: under another program nobody ended the panel."""
+    """SIGHUP goes to the session leader only: under another program nothing ended the panel."""
     master, slave = os.openpty()
     driver: Any = type("Fake", (), {"fileno": slave, "exit_event": Event(), "_app": Stops()})()
     driver.wanted = False

@@ -14,7 +14,7 @@ from tui.terminal.outlet import Outlet
 
 
 class LostTerminal:
-    """Takes nothing: its other end is closed."""
+    """Accepts nothing: its other end is closed."""
 
     def write(self, text: str) -> int:
         return len(text)

@@ -1,8 +1,8 @@
-"""What tui/terminal uses of Textual that Textual does not promise; where it went, this tells.
+"""Private parts of Textual that tui/terminal uses; the checks show what changed.
 
-Looked at with Textual 8.2.8. Where a check fails after an update, look at the named module and at
-what Textual does now, before the versions in pyproject.toml are changed. No other room of the
-project uses such parts.
+Reviewed with Textual 8.2.8. If a check fails after an update, read the named module and the new
+code of Textual, before the versions in pyproject.toml are changed. No other package of the project
+uses such parts.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ class Part(NamedTuple):
     used_in: str
     """The module of tui/terminal that rests on it."""
     look_at: str
-    """What to read there and in Textual, when it is not what it was."""
+    """Places to read in tui and in Textual if it has changed."""
     still: Callable[[], bool]
 
 

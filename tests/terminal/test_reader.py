@@ -51,7 +51,7 @@ class Stops:
 def read(
     *reads: tuple[float, bytes], typing: bool = False
 ) -> tuple[list[str], list[Pressed], list[TerminalInput]]:
-    """What reads at these times come to: stops, keys, and all that the app is told."""
+    """Result of reads at these times: stops, keys, and everything the app receives."""
     stops = Stops(typing=typing)
     reader, found = KeyReader(stops), list[TerminalInput]()
     for at, data in reads:
@@ -124,7 +124,7 @@ def test_sequence_interrupted_by_a_stop_has_the_older_stamp() -> None:
     stops = Stops()
     reader = KeyReader(stops)
     reader.read(b"\x1b[", 1.0, stops.stop_stamp())
-    stops.taken.append("f12")  # somebody else
+    stops.taken.append("f12")  # another source
     reader.read(b"A", 1.5, stops.stop_stamp())
     (key,) = [paste for paste in reader.tick(LATER) if isinstance(paste, Pressed)]
     assert (key.name, key.stroke.stamp, key.stroke.read_at) == ("up", 0, 1.0)

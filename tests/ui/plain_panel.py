@@ -1,7 +1,7 @@
 """The same drive in stock widgets, as the peer for the panel's bytes.
 
-Run as a program it watches the simulated Altivar 71 that `drivepanel demo` has, with the same
-refresh: large digits, a sparkline, a table whose cells are updated one by one.
+As a program it monitors the simulated Altivar 71 that `drivepanel demo` has, with the same refresh:
+large digits, a sparkline, a table whose cells are updated one by one.
 """
 
 from __future__ import annotations

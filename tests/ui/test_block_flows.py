@@ -95,7 +95,7 @@ async def test_slots_are_picked_moved_written_and_verified() -> None:
         await write(made)
         await message(made, "Wrote NMA2, NMA3, all verified", "Lost at power-off")
         assert [made.drive().raw(f"NMA{n}") for n in (1, 2, 3)] == [3201, 3204, 8604]
-        # nobody has looked at Parameters: what is lost at power-off is told all the same
+        # Parameters was never opened: losses at power-off are still reported
         await until(made.pilot, lambda: "3 Parameters S" in shown(made.app, "tabs"))
         await made.pilot.press("q")
         await until(made.pilot, lambda: "2 written settings are not saved" in picture(made.app))
@@ -135,7 +135,7 @@ async def test_change_by_another_source_is_detected_and_not_overwritten() -> Non
         await write(made)
         await message(made, "Another program changed NMA1")
         assert made.drive().raw("NMA1") == 9001
-        # now that it was told, it may be overwritten
+        # after the message, it may be overwritten
         await until(made.pilot, lambda: "→ ETA" in shown(made.app, "first"))
         await until(made.pilot, lambda: not block_editor(made).busy)
         await write(made)

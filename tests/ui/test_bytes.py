@@ -1,4 +1,4 @@
-"""What the panel sends to its terminal: little, and never something else than it shows."""
+"""Output of the panel to its terminal: little, and always what it shows."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ class Terminal:
 
 
 def _part(number: str) -> str:
-    """What a number of a style sets; nothing where it resets all."""
+    """Attribute that a number of a style sets; nothing if it resets all."""
     if number in ("48", *map(str, (*range(40, 48), *range(100, 108)))):
         return "behind"
     if number in ("38", *map(str, (*range(30, 38), *range(90, 98)))):
@@ -157,7 +157,7 @@ async def test_terminal_shows_the_content_of_the_screen(seed: int) -> None:
 
 
 def _seen(character: str, color: str) -> str:
-    """What is seen of a style: of a blank, what lies behind it."""
+    """Visible part of a style: of a blank, its background."""
     return blank_style(color) if character == " " else color
 
 
@@ -291,7 +291,7 @@ def test_frame_begins_with_the_status_bar_and_the_message() -> None:
 
 
 class Paced(LeanApp):
-    """One line; what goes to its terminal is kept, and answered when the test wants it."""
+    """One line; its output is recorded, and acknowledged when the test wants."""
 
     def __init__(self) -> None:
         super().__init__()

@@ -106,11 +106,11 @@ class Bench(NamedTuple):
         await until(self.pilot, lambda: bool(app.fleet and app.fleet.line_watch.under_command()))
 
     def is_armed(self) -> bool:
-        """Whether the strip says that the drive is armed."""
+        """True if the status bar says that the drive is armed."""
         return " ARMED" in shown(self.app, "strip")
 
     def last_stop(self, device: int = 1) -> StopReport | None:
-        """What was last told of a stop of this drive."""
+        """Last message about a stop of this drive."""
         return self.app.fleet.stopper.reports.get(device) if self.app.fleet else None
 
     async def stopped(self, device: int = 1, *, behind: StopReport | None = None) -> None:
@@ -125,12 +125,12 @@ class Bench(NamedTuple):
 
 
 def output(app: DrivePanelApp) -> str:
-    """What Monitor says below its values, and the newest message, on one line."""
+    """Text of Monitor below its values, and the newest message, on one line."""
     return " ".join(f"{shown(app, 'message')} {shown(app, 'said')}".split())
 
 
 def runs(app: DrivePanelApp) -> bool:
-    """Whether the strip says that the motor runs."""
+    """True if the status bar says that the motor runs."""
     return any(word in shown(app, "strip") for word in ("FORWARD", "REVERSE", "RUNNING"))
 
 
@@ -148,7 +148,7 @@ def writes(app: DrivePanelApp, since: float = 0.0) -> list[bytes]:
 
 
 def knows_the_state(app: DrivePanelApp) -> bool:
-    """Whether Monitor shows a state that was read: until then nothing can be armed."""
+    """True if Monitor shows a state that was read: before, nothing can be armed."""
     screen = app.screen
     latest = screen.console.latest if isinstance(screen, MonitorScreen) else None
     known = latest is not None and not latest.error and latest.state.kind != "unknown"
@@ -186,7 +186,7 @@ async def bench(
     _wait.SLEEP_IDLE = _wait.SLEEP_GRANULARITY / 4
     try:
         async with app.run_test(size=(80, 24)) as pilot:
-            # a drive is listed once it has its profile; Enter before that is for nobody
+            # a drive is listed once it has its profile; Enter before that opens no drive
             await until(pilot, lambda: app.connection.drives.option_count == len(families))
             drives = app.connection.query_one("#drives", OptionList)
             drives.focus()
@@ -317,7 +317,7 @@ async def test_failed_reset_text_is_not_cut_at_80x24(family: str, sets: dict[str
 
 
 def failed_reset(app: DrivePanelApp) -> str:
-    """What was said of a reset after which the drive was still in fault."""
+    """Messages of a reset after which the drive was still in fault."""
     return next((event.text for event in app.events.events if "still in fault" in event.text), "")
 
 
@@ -410,18 +410,18 @@ async def test_stop_works_on_every_screen() -> None:
             made.app.events.add("told", f"stopped on {screen}")
             await made.pilot.press("f12")
             await made.stopped(behind=before)
-            # a stop voids a question about the drive, and the line that would run it
+            # a stop cancels a question about the drive, and the run line
             assert isinstance(made.app.screen, kind) is not issubclass(kind, Question), screen
             assert "RUN REVERSE" not in shown(made.app, "message"), screen
             if "console" not in vars(made.app.screen):
-                # nothing of this screen tells of the drive, so the panel does
+                # this screen shows nothing of the drive, so the panel does
                 await until(made.pilot, lambda: "The motor is stopped" in shown(made.app, "said"))
             while not isinstance(made.app.screen, MonitorScreen):
                 await made.pilot.press("escape")
 
 
 def reported(app: DrivePanelApp) -> str:
-    """What was said, the toasts for a motor that does not stop included."""
+    """All messages, the notices for a motor that does not stop included."""
     output = [event.text for event in app.events.events]
     return " ".join([*output, *(notification.message for notification in app._notifications)])
 
@@ -573,5 +573,5 @@ async def test_internal_error_stops_the_motor() -> None:
 
 
 def broken() -> None:
-    """What a screen should never do."""
+    """An error that a screen should never raise."""
     raise RuntimeError("the screen is upside down")

@@ -1,4 +1,4 @@
-"""Pictures of commanding: armed, ordered, refused, stopping, tripped; and its screens."""
+"""Pictures of commanding: armed, commanded, refused, stopping, tripped; and its screens."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ from .test_pictures import SIZES, WATCH, Compare
 
 @dataclass
 class KeyInput:
-    """How a drive is commanded from here: armed for so many seconds, and what came of it."""
+    """Command state of a drive: armed for this many seconds, and the result."""
 
     armed_for: float | None = None
     outcome: Outcome | None = None
     lost: bool = False
-    """Whether the drive no longer holds the command word that was written."""
+    """True if the drive no longer has the written command word."""
 
 
 @dataclass
@@ -42,7 +42,7 @@ class FakeStopper:
         """Nothing turns."""
 
     def wait(self, *_: Any) -> StopSummary:
-        """Every motor stands."""
+        """All motors are at standstill."""
         return StopSummary([])
 
 

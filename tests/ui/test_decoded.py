@@ -26,7 +26,7 @@ def no_raws(device: int) -> Mapping[str, int]:
 
 
 def reported(*frames: tuple[str, str], tcp: bool = False) -> list[str]:
-    """What frames say; each its direction and its bytes without the checksum."""
+    """Decoded frames; each with its direction and its bytes without the checksum."""
     made = []
     for direction, text in frames:
         data = bytes.fromhex(text)

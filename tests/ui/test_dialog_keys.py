@@ -1,4 +1,4 @@
-"""What stands at the bottom of a dialog is what the next key does, on every dialog there is."""
+"""Keys shown at the bottom of every dialog match the keys that work."""
 
 from __future__ import annotations
 
@@ -253,11 +253,11 @@ async def test_keys_of_a_dialog_are_always_visible(
         }
         for name, make in {**DIALOGS, **long}.items():
             if name == "HelpScreen":
-                continue  # it scrolls as a whole, and tells its key at the top
+                continue  # it scrolls as a whole, and shows its key at the top
             await app.push_screen(make(app, console))
             await pilot.pause()
             if name == "long Confirm":
-                await pilot.press("enter")  # that Enter is no answer takes a line more
+                await pilot.press("enter")  # the text that Enter does not answer needs another line
                 await pilot.pause()
             dialog = app.screen
             hint = dialog.query_one("#hint")
@@ -294,7 +294,7 @@ async def test_invalid_file_name_is_refused_in_the_dialog(name: str, why: str) -
 
 
 def faults_of(parse: Callable[[str], object]) -> Callable[[str], str]:
-    """What a parser says of a text."""
+    """Result of a parser for a text."""
 
     def check(text: str) -> str:
         with pytest.raises(LinkSyntaxError) as refused:

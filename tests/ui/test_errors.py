@@ -1,4 +1,4 @@
-"""What the panel does when something goes wrong that nobody foresaw, or comes too late."""
+"""The panel after unforeseen errors, and events that come too late."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def test_reset_text_is_never_cut_off(raw: int, width: int, height: int) -> None:
 
 
 def test_input_that_caused_the_trip_fits_80_columns() -> None:
-    """'Logic input ...' and 16#000C told nobody where to look."""
+    """'Logic input ...' and 16#000C did not show where to look."""
     external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
     text = reported(view(external.raw, readings=read))

@@ -79,7 +79,7 @@ def shown(app: DrivePanelApp, part: str) -> str:
 
 
 async def to_monitor(app: DrivePanelApp, pilot: Pilot[None], device: int) -> MonitorScreen:
-    # a drive is listed once it has its profile; Enter before that is for nobody
+    # a drive is listed once it has its profile; Enter before that opens no drive
     await until(pilot, lambda: app.connection.drives.option_count == len(DRIVES))
     drives = app.connection.query_one("#drives", OptionList)
     drives.focus()
@@ -200,7 +200,7 @@ async def test_percentage_becomes_amperes_once_the_rating_is_known() -> None:
 
 
 def alone(line_watch: LineWatch) -> dict[int, float]:
-    """Seconds after which drives act once they are left alone, by device."""
+    """Seconds after which drives react once polling stops, by device."""
     return {device: watch.timeout for device, watch in line_watch.left_alone().items()}
 
 
@@ -304,7 +304,7 @@ async def test_help_pauses_drawing_below_it_and_says_so(
         await pilot.pause()
         before, latest = motor.redrawn, screen.console.monitor.latest
         await until(pilot, lambda: any("as of" in line.plain for line in state.lines))
-        # the drive is watched all the same
+        # the drive is still monitored
         await until(pilot, lambda: screen.console.monitor.latest is not latest)
         assert motor.redrawn == before
         await pilot.press("escape")

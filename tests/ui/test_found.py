@@ -1,4 +1,4 @@
-"""What Line says of a drive that answered."""
+"""Rows of Line for drives that answered."""
 
 from __future__ import annotations
 
@@ -149,7 +149,7 @@ async def test_new_state_moves_nothing_in_a_long_drive_list(
         await pilot.pause()
         assert (drives.scroll_offset, drives.highlighted) == (before, 25)
         assert "■ OHF" in str(drives.get_option("26").prompt)
-        # nobody touches a key for a while: faults go first, the cursor stays on its drive
+        # no key for a while: faults are listed first, the cursor stays on its drive
         app.clock.monotonic = lambda: fakes.NOW + QUIET  # type: ignore[method-assign]
         screen._typed_at = fakes.NOW
         screen.show_drives()
@@ -171,7 +171,7 @@ def test_drive_keeps_its_stop_if_another_drive_replaces_it() -> None:
     fleet, console = taken()
     fleet.note(fakes.ATV71)
     assert fleet.consoles == [console]
-    fleet.note(replace(fakes.ATV71, reference="ATV99"))  # another one stands there now
+    fleet.note(replace(fakes.ATV71, reference="ATV99"))  # another drive is there now
     assert fleet.consoles == []
 
 

@@ -1,4 +1,4 @@
-"""The frame on a real line: what it tells on every screen and over every dialog, live."""
+"""The frame on a real line: live on every screen and over every dialog."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Panel:
         return self.app.opened.simulation
 
     def shown(self, place: str) -> str:
-        """What stands at a place of the screen on top."""
+        """Text at a place of the top screen."""
         found = self.app.screen.query(f"#{place}").results(Lines)
         return "\n".join(line.plain for lines in found for line in lines.lines)
 

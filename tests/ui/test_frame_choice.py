@@ -1,4 +1,4 @@
-"""Which frames are shown, how one stands in the list, and what is kept of them."""
+"""Selection of frames, their form in the list, and their storage."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def reported(frames: Sequence[Frame]) -> list[str]:
         ("f6", [*REFUSED, *TO_ALL]),
         ("2 write", REFUSED),
         ("READ 5", SILENT),
-        # a broadcast is answered by nobody, and the last one may be answered yet
+        # a broadcast has no reply, and the reply to the last request may still come
         ("error", [*REFUSED, *SILENT, *LATE]),
         ("errors 2", [*REFUSED, *LATE]),
         ("acc", [*REFUSED, *TO_ALL, *LATE]),

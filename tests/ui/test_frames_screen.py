@@ -168,7 +168,7 @@ async def test_drive_counters_are_reset_only_after_confirmation() -> None:
         assert counters.frames >= before
         screen = made.app.screen
         assert isinstance(screen, FramesScreen)
-        for ended in (True, False):  # the minute of arming may end while the question stands
+        for ended in (True, False):  # the minute of arming may end while the question is open
             await made.pilot.press("Z")
             await made.until(lambda: isinstance(made.app.screen, Confirm))
             if ended:

@@ -33,7 +33,7 @@ from .test_flows import shown, until
 from .test_pictures import BOTH_SIZES
 
 ATV71 = frame(6, bytes.fromhex("2b 0e 01 01 00 00 01 01 0b") + b"ATV71HU15M3")
-"""What the drive at 6 says of itself."""
+"""Identification of the drive at 6."""
 
 
 @pytest.fixture(autouse=True)
@@ -48,7 +48,7 @@ def output(app: DrivePanelApp) -> str:
 
 
 def talk(peer: PtyPeer) -> None:
-    """A master asks the drive at 6 who it is and how it is, and gives it a reference."""
+    """A master identifies and reads the drive at 6, and gives it a reference."""
     exchanges = (
         (frame(6, bytes.fromhex("2b 0e 01 00")), ATV71),
         (read_frame(6, 3201, 1), frame(6, bytes.fromhex("03 02 0637"))),
@@ -205,7 +205,7 @@ async def test_monitoring_pauses_polling_after_confirmation() -> None:
 
 @dataclass
 class Watch:
-    """What a look at all drives brought."""
+    """Result of a look at all drives."""
 
     commanded: list[Any] = field(default_factory=list)
     acting: dict[int, Any] = field(default_factory=dict)
@@ -248,7 +248,7 @@ def test_reasons_that_block_monitoring_are_named() -> None:
 
 
 class StillHearing(HeardLine):
-    """What was heard once: the same frames and figures each time."""
+    """Recorded traffic: the same frames and figures each time."""
 
     def __init__(self) -> None:
         super().__init__("serial:/dev/ttyUSB0,19200,8E1", "panel")
@@ -262,7 +262,7 @@ class StillHearing(HeardLine):
             self._say(fakes.NOW - 24 + 2 * number)
 
     def _say(self, at: float) -> None:
-        """A cycle of a master: a drive that is fed, and one that is not."""
+        """A cycle of a master: one drive polled in time, and one not."""
         cycle = (
             (read_frame(1, 0xFD00, 1), frame(1, bytes.fromhex("03 02 0bb8"))),
             (frame(6, bytes.fromhex("2b 0e 01 00")), ATV71),

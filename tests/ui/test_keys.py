@@ -1,4 +1,6 @@
-"""One key, one meaning: the table of actions has no clash, and no letter writes by itself."""
+"""One key, one meaning: the table of actions has no clash, and no letter writes without
+confirmation.
+"""
 
 from __future__ import annotations
 
@@ -132,7 +134,7 @@ OVER = {"messages": "m", "wiring": "I"}
 
 
 def strange_on(screen: str) -> dict[str, Action]:
-    """The keys that have no meaning there, each with the action that it has elsewhere."""
+    """Keys without a meaning there, each with its action on other screens."""
     here = {key for a in ACTIONS if screen in a.screens for key in a.keys.split(",")}
     strange: dict[str, Action] = {}
     for action in ACTIONS:
@@ -236,11 +238,11 @@ async def test_text_after_slash_is_searched_on_a_slow_computer(
 
 
 def found(made: Bench) -> str:
-    """What stands in the search; nothing while the screen is being put together."""
+    """Text of the search; nothing while the screen is being composed."""
     return "".join(field.value for field in made.app.screen.query("#search").results(Input))
 
 
-# No letter writes by itself
+# No letter writes without confirmation
 
 
 async def stage(made: Bench) -> None:

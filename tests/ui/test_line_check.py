@@ -52,7 +52,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def simulation() -> Iterator[Simulation]:
-    """Two drives whose motors run; the second does not say who it is."""
+    """Two drives with running motors; the second does not identify itself."""
     made = Simulation([DriveSpec("atv71", 2, run_hz=30.0), DriveSpec("powerdrive", 5, run_hz=20.0)])
     made.start()
     yield made
@@ -91,7 +91,7 @@ async def test_changed_drive_is_read_only_until_confirmed(
         # a stop needs no answer
         await pilot.press("space")
         await until(pilot, lambda: simulation.drive(2).motor.frequency == 0)
-        # nor is it asked again by itself
+        # nor does the question come again automatically
         assert isinstance(app.screen, MonitorScreen)
         await app.run_action("accept_line")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
@@ -164,7 +164,7 @@ async def test_adapter_changed_while_the_line_was_lost_needs_confirmation(
 
 @asynccontextmanager
 async def lost_with_adapter_changed(adapters: Adapters) -> AsyncIterator[Pilot[None]]:
-    """A panel whose line has another adapter now, before it is asked about."""
+    """A panel whose line now has another adapter, before the question."""
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     KnownLine(line_of(port))
     adapters.unplug("ttyUSB0")

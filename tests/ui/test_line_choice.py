@@ -1,4 +1,4 @@
-"""Line: Enter leaves no good line unasked, and the cursor stays where it is meant to be."""
+"""Line: Enter never closes a good line without a question, and the cursor stays on its drive."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Line:
 
     async def searched(self) -> None:
         """Wait until the search goes on."""
-        # whichever address it has come to: a look every 50 ms may miss the first
+        # at any address: a check every 50 ms may miss the first
         await until(
             self.pilot,
             lambda: re.search(r" Scan \d+ of \d", shown(self.app, "search")) is not None,
@@ -60,7 +60,7 @@ class Line:
 
 @asynccontextmanager
 async def line(*, first: int = 3, family: str = "atv21") -> AsyncIterator[Line]:
-    """The panel that was started on a line; below the first drive nobody answers."""
+    """The panel started on a line; only its first drive answers."""
     simulation = Simulation([DriveSpec(family, first, run_hz=30.0), DriveSpec("atv71", first + 3)])
     simulation.start()
     real = rtu_tcp(simulation)
@@ -213,12 +213,12 @@ async def test_cursor_stays_on_its_drive_not_its_row() -> None:
 
 
 class HandClock(fakes.StillClock):
-    """A clock that goes when it is told to."""
+    """A clock that advances by the test."""
 
     now = fakes.NOW
 
     def monotonic(self) -> float:
-        """Seconds that the test has let go by."""
+        """Seconds that the test has advanced."""
         return self.now
 
 

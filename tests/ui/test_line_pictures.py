@@ -31,7 +31,7 @@ Compare = Callable[..., bool]
 PORTS = [("/dev/ttyUSB0", "USB-RS485 adapter"), ("/dev/ttyS0", "")]
 MODELS = ("ATV312HU09M3", "ATV21H075M3X", "ATV71HU15M3")
 LONG_AGO = 1_600_000_031.0
-"""When all was said, time.time(): a message that warns stands on several lines while it is new."""
+"""Time of all messages, as time.time(): a warning has several lines while it is new."""
 ADAPTER = "serial:/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0,19200,8E1"
 SETTINGS = f"""
 [lines]

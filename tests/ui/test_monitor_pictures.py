@@ -159,7 +159,7 @@ OF_A_MOTOR = (
     "running", "reverse", "accelerating", "stopping", "stopped", "at-zero", "fault", "alarm",
     "stop-failed", "standby-armed", "run", "run-at-zero", "run-refused", "line-lost", "not-heard",
 )  # fmt: skip
-"""What a motor does, and what the next key would do."""
+"""State of a motor, and the effect of the next key."""
 
 
 @SIZES

@@ -1,4 +1,4 @@
-"""What Monitor says in words: the state, why a command has no effect, the bits that are 1."""
+"""Words on Monitor: the state, why a command has no effect, the bits that are 1."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_command_without_effect_names_next_step(
 
 @pytest.mark.parametrize("eti", [0x0002, 0x4002])
 def test_idle_altivar_312_set_up_for_modbus_is_commanded_by_modbus(eti: int) -> None:
-    """Whether its extended status word names the channel yet or not."""
+    """True if its extended status word names the channel."""
     profile = library.load("atv312")
     raws = {"LAC": 2, "CHCF": 1, "Fr1": 164, "rFC": 96, "LRS3": 0, "ETA": 0x0240, "ETI": eti}
     view = view_of(profile, raws)
@@ -182,7 +182,7 @@ def test_word_line_lists_only_bits_lit_in_the_grid(family: str) -> None:
 
 
 def test_bit_in_columns_has_its_subject() -> None:
-    """At 80 columns two bits of LRS7 read 'In force', and nothing told which channels are."""
+    """At 80 columns two bits of LRS7 read 'In force', without their channels."""
     view = view_of(ATV71, {**fakes.RUNNING, "LRS7": 0x0005})
     grid = bit_grid(view, word_pages([ATV71["LRS7"]], 15)[0], 79, 6)
     reported = "\n".join(line.plain for line in grid)

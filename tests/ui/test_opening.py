@@ -1,4 +1,4 @@
-"""The panel with a drive named at the start: what stands first, and where it leads."""
+"""The panel with a drive named at the start: its first screen, and the next ones."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Held:
 
     @property
     def closed(self) -> int:
-        """How many of the lines that were opened are closed again."""
+        """Count the opened lines that are closed again."""
         return sum(line.line.state.status.value == "closed" for line in self.lines)
 
     def let(self) -> None:

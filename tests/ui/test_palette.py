@@ -1,4 +1,4 @@
-"""The palette: actions of every screen by their words, and nothing dangerous by itself."""
+"""The palette: actions of every screen by their words; dangerous ones need their full name."""
 
 from __future__ import annotations
 
@@ -110,7 +110,7 @@ async def typed(made: Bench, query: str) -> OptionList:
 
 
 def reports(made: Bench) -> dict[int, object]:
-    """What stops were made, by device."""
+    """Stops made, by device."""
     return dict(made.app.fleet.stopper.reports) if made.app.fleet else {}
 
 
@@ -200,6 +200,6 @@ async def test_palette_does_not_open_over_a_question() -> None:
 
 
 def output(made: Bench) -> str:
-    """What was said last."""
+    """Last message."""
     newest = made.app.events.newest
     return newest.text if newest is not None else ""

@@ -66,7 +66,7 @@ async def answer(made: Bench, key: str, text: str) -> None:
 
 
 async def stage(made: Bench, value: str, reported: str) -> None:
-    """Type a value for the parameter under the cursor; what is told of it."""
+    """Type a value for the selected parameter; return the message about it."""
     await made.pilot.press("enter")
     await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
     made.app.screen.query_one(Input).value = value
@@ -443,7 +443,7 @@ async def test_remaining_edits_after_a_failure_need_confirmation(key: str) -> No
 async def test_stop_after_the_write_shows_results_without_a_question(
     stops_since: int, dialog: type
 ) -> None:
-    """Whoever comes back to the screen after a stop reads what became of it, and no more."""
+    """After a stop, the screen shows the results of the write, and nothing more."""
     console = editor_of(fakes.RUNNING, armed=52.0)
     console.editor.applied = failed(console.editor)
     app = panel(console)

@@ -62,7 +62,7 @@ def still_editor(console: DriveConsole, state: Callable[[], DriveState | None]) 
 def editor_of(
     state: dict[str, int], *, armed: float | None = None, reading: bool = False
 ) -> DriveConsole:
-    """An Altivar 71 with an editor that stands still."""
+    """An Altivar 71 with a paused editor."""
     profile = library.load("atv71")
     snapshot = fakes.snapshot_of(profile, state)
     console = fakes.console_of(snapshot, armed=armed)
@@ -79,7 +79,7 @@ def editor_of(
 
 
 TEXTS_SHOWN: list[tuple[str, str]] = []
-"""What the prepared state has said: told to the events of its panel."""
+"""Messages of the prepared state, as events of its panel."""
 
 
 def panel(console: DriveConsole) -> DrivePanelApp:
@@ -224,7 +224,7 @@ OF_WRITING = (
     "settings", "number", "past-a-limit", "out-of-range", "staged", "confirm", "write",
     "write-running", "written", "refused", "locked", "not-armed", "rest",
 )  # fmt: skip
-"""What a person sees on the way to a value in the drive."""
+"""Steps on the way to a value in the drive."""
 
 OTHER_SIZES = [
     pytest.param(state, size, id=f"{size[0]}x{size[1]}-{state}", marks=marks)

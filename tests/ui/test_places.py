@@ -133,7 +133,7 @@ def test_numbers_and_units_are_aligned(profile_id: str, data: st.DataObject) -> 
 
 
 def test_values_shown_beside_monitor_are_read() -> None:
-    """Who commands and who gives the reference would stand as dashes."""
+    """The command and reference sources would be dashes."""
     for profile in map(library.load, PROFILES):
         channels = [profile.quantity("command_channel"), profile.quantity("reference_channel")]
         wanted = {channel.code for channel in channels if channel is not None}
@@ -195,7 +195,7 @@ def test_trend_shows_the_sign_and_a_line_for_the_reference() -> None:
 
 
 def keys_shown(screen: str, width: int, stops: str = "STOP") -> Text:
-    """The line of keys of a screen, as it draws it; `stops` says whom the stop key stops."""
+    """The key line of a screen, as it draws it; `stops` names the target of the stop key."""
     keys = keys_line(screen, width, stops)
     profile = library.load("atv71")
     return (

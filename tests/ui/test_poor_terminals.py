@@ -1,4 +1,4 @@
-"""Terminals that lack signs, colors or room: what stands on them, and that it is all they have."""
+"""Terminals without symbols, colors or space: complete text with the means they have."""
 
 from __future__ import annotations
 

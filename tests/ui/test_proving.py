@@ -1,4 +1,4 @@
-"""The proof of communication loss from Control: its question, its work, what it came to."""
+"""The communication timeout test from Control: its question, its work, its result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds for every question: which keys are yes, when they count, what the motor does."""
+"""Rules of every question: keys that mean yes, when they count, and the motor state."""
 
 from __future__ import annotations
 
@@ -36,17 +36,17 @@ from .test_command_flows import writes as writes
 from .test_flows import arm, shown, until
 
 MOMENT = 0.3
-"""Seconds before which Enter and y are no answers, by the rules of the panel's hands."""
+"""Seconds before which Enter and y do not answer, by the safety rules."""
 
 
 class HandClock(fakes.StillClock):
-    """A clock that goes when it is told to."""
+    """A clock that advances by the test."""
 
     def __init__(self) -> None:
         self.now = fakes.NOW
 
     def monotonic(self) -> float:
-        """Seconds that the test has let go by."""
+        """Seconds that the test has advanced."""
         return self.now
 
 
@@ -73,7 +73,7 @@ def confirm(
 
 
 class OpenQuestion:
-    """A question on the screen of a panel without a line, and what became of it."""
+    """A question on the screen of a panel without a line, and its result."""
 
     def __init__(self, question: Question[Any]) -> None:
         self.question = question
@@ -443,7 +443,7 @@ FAMILY = {
     "take control": "powerdrive",
     "brake": "atv21",
 }
-"""The drive that is asked about, where it is not an Altivar 71."""
+"""The drive of the question, unless it is an Altivar 71."""
 
 
 @pytest.mark.parametrize("name", kept(QUESTIONS, "write", "control", "coast"))
@@ -467,7 +467,7 @@ async def test_only_y_writes(name: str) -> None:
 
 
 async def back_to_monitor(made: Bench) -> None:
-    """From where the question was asked; what was staged or armed there is let go."""
+    """Screen of the question; its staged edits and arming are discarded."""
     if isinstance(made.app.screen, ParametersScreen):
         made.app.screen.editor.staging.undo_all()
         await made.pilot.press("A", "2")
@@ -486,7 +486,7 @@ async def test_panel_does_not_exit_during_a_question() -> None:
         await made.pilot.press("ctrl+q", "ctrl+c")
         await made.pilot.pause(0.2)
         assert made.app.screen is requested
-        # by a way of its own it is asked too: what is staged would be lost
+        # another path asks too: staged edits would be lost
         await made.app.action_quit()
         await until(made.pilot, lambda: made.app.screen is not requested)
         await until(made.pilot, lambda: bool(made.app.screen.query("#question")))

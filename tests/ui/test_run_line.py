@@ -21,7 +21,7 @@ from .test_command_flows import Bench, bench, disarmed, output, writes
 from .test_flows import shown, until
 
 MOMENT = 0.3
-"""Seconds before which Enter is no answer, by the rules of the panel's hands."""
+"""Seconds before which Enter does not answer, by the safety rules."""
 SETTLED = ENTER_COUNTS_AFTER
 LINE = RunLine("forward", "30.0", "Hz", fakes.NOW, 0)
 ARROWS = ("up", "down", "pageup", "pagedown")

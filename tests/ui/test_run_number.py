@@ -1,4 +1,4 @@
-"""The line that runs a motor: what is typed in it, what it tells, and when Enter counts."""
+"""The run line: its input, its text, and when Enter counts."""
 
 from __future__ import annotations
 

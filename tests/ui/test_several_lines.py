@@ -37,7 +37,7 @@ async def two_lines() -> AsyncIterator[Panel]:
 
 
 def turning(made: Panel) -> list[bool]:
-    """Whether the motor of each line turns, by the simulated drives themselves."""
+    """True for each line whose motor turns, by the simulated drives."""
     found = []
     for line in made.app.panel_lines:
         assert line.opened.simulation is not None
@@ -50,7 +50,7 @@ async def test_second_line_opens_beside_and_both_can_be_shown() -> None:
         app = made.app
         first, second = app.panel_lines
         assert app.opened is second.opened
-        assert app.screen is app.connection  # nothing was asked: nothing is closed
+        assert app.screen is app.connection  # no question, and nothing is closed
         assert first.opened.line.state.status.value == "connected"
         await made.until(lambda: "1 of 2 lines" in made.shown("strip"))
         app.connection.open_line(FIRST)

@@ -47,7 +47,7 @@ BARE = (
 
 @pytest.fixture(scope="module")
 def errors(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """What strict mypy finds wrong in a screen, by the expression that it draws."""
+    """Errors that strict mypy finds in a screen, by the expression that it draws."""
     folder: Path = tmp_path_factory.mktemp("screens")
     files = {}
     for at, expression in enumerate((WITH_AGE, *BARE)):

@@ -1,4 +1,4 @@
-"""Where a stop key stops and where it is text, and that every stop has a stamp of its own."""
+"""Places where a stop key stops and where it is text; every stop has its own stamp."""
 
 from __future__ import annotations
 
@@ -138,7 +138,7 @@ async def test_space_is_text_again_after_a_pending_key_is_handled() -> None:
 async def test_stop_cancels_a_key_in_processing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The screen may take seconds for it, where the terminal takes nothing."""
+    """The screen may take seconds for it if the terminal blocks."""
     app = app_of()
     done: list[str] = []
     monkeypatch.setattr(app, "action_help", lambda: done.append("help"))
@@ -200,7 +200,7 @@ async def test_stop_reports_a_device_without_a_known_stop() -> None:
         (text,) = app.frame_now().not_stopped
         assert text.startswith("NOT STOPPED: device 7")
         app.chosen = app.fleet.consoles[0]
-        assert app.take_stop_key("space")  # one drive is meant, and reached
+        assert app.take_stop_key("space")  # one drive is the target, and is reached
         await pilot.pause()
         assert [event for event in app.events.events if event.kind == "failed"] == reported
 

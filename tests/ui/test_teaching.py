@@ -21,7 +21,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 async def pick(made: Bench, code: str) -> None:
-    """Choose a value on Monitor; the question for its display stands then."""
+    """Select a value on Monitor and open the question for its display value."""
     await made.pilot.press("L")
     await until(made.pilot, lambda: isinstance(made.app.screen, PickWord))
     listed = made.app.screen.query_one(OptionList)

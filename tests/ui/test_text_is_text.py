@@ -1,4 +1,4 @@
-"""What people, drives, files and profiles write is text: no markup, no command to the terminal."""
+"""Texts of people, drives, files and profiles: no markup, no control of the terminal."""
 
 from __future__ import annotations
 
@@ -130,14 +130,14 @@ async def parameters(made: Bench) -> None:
 
 
 def reported(made: Bench) -> str:
-    """What Scanner says, or what was said last."""
+    """Text of Scanner, or the last message."""
     newest = made.app.events.newest
     here = shown(made.app, "message") if made.app.screen.query("#message") else ""
     return f"{here} {newest.text if newest else ''}"
 
 
 async def files(made: Bench) -> None:
-    """A list of files whose names are markup; what is told of one that is no set names it."""
+    """A list of files whose names are markup; the message about an invalid one names it."""
     for name in FILES:
         file = Path(name)
         write(file, "format = 1\n[drive\n")
@@ -266,7 +266,7 @@ async def test_texts_of_dialogs_notices_and_lists_are_shown_literally() -> None:
 
 
 def picture(app: DrivePanelApp) -> str:
-    """What stands on the screen, as text."""
+    """Text on the screen."""
     lines = app.screen._compositor.render_strips()
     return "\n".join(strip.text for strip in lines)
 
@@ -319,7 +319,7 @@ def test_drive_name_does_not_control_terminal() -> None:
 
 
 def read_until(terminal: int, *wanted: bytes) -> bytes:
-    """What a program writes until all of this is in it."""
+    """Output of a program until all of this is in it."""
     seen = b""
     end = time.monotonic() + PATIENCE
     while not all(part in seen for part in wanted):

@@ -43,7 +43,7 @@ def plain(text: str) -> str:
 
 
 def on_screen(app: DrivePanelApp) -> str:
-    """All that stands on the screen."""
+    """All text on the screen."""
     return plain(picture(app))
 
 

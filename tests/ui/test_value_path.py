@@ -1,4 +1,4 @@
-"""How many modules and carriers a value passes, from the transport to the line on Monitor."""
+"""Number of modules and carriers that a value passes, from the transport to the line on Monitor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""N: why a drive does not answer, on Line and on Monitor; a stop works there."""
+"""Key N: why a drive does not answer, on Line and on Monitor; a stop works there."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals 
 
 @pytest.fixture
 def nobody() -> Iterator[PtyPeer]:
-    """A line on which nobody answers."""
+    """A line without an answering drive."""
     with PtyPeer(silent) as peer:
         yield peer
 
@@ -64,7 +64,7 @@ async def test_why_on_line_uses_address_and_profile_of_the_form(
         assert "Address: ADD. At OFF (0)" in text
         assert "Address 7 on" in shown(app, "asked")
         assert {request[1] for request in nobody.requests} <= {3, 43}
-        # it is kept among the messages, and asked anew by the same key
+        # it is kept among the messages, and requested again by the same key
         assert "No device answers at address 7" in app.events.events[-1].text
         await pilot.press("N")
         await until(pilot, lambda: len(app.events.events) > 1)

@@ -50,7 +50,7 @@ def file_of(form: PacketForm, path: Path) -> Path:
 
 
 def reported(program: str, path: Path, *options: str) -> str:
-    """What tshark says of a file."""
+    """Output of tshark for a file."""
     done = subprocess.run(
         [program, *options, "-r", str(path)],
         capture_output=True,

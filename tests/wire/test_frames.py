@@ -51,7 +51,7 @@ def test_complete_frames_match_the_reference_check(data: bytes) -> None:
 def test_frame_ends_with_its_checksum(before: bytes, device: int, pdu: bytes) -> None:
     data = before + frame(device, pdu)
     end = frame_end(data, len(before))
-    # a shorter frame may happen to stand at its beginning
+    # its beginning may happen to be a shorter frame
     assert end is not None
     assert is_whole(data[len(before) : end])
     assert frame_end(data[: end - 1], len(before)) is None

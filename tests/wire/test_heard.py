@@ -1,4 +1,4 @@
-"""What others say on a line: bytes apart into frames, frames into exchanges."""
+"""Traffic of other masters: bytes into frames, frames into exchanges."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]
         ((READ, WORDS, WORDS), [(2, 3, "ok"), (2, 3, "again")]),
         ((COMMAND, COMMAND, COMMAND, READ, WORDS), [(2, 6, "ok"), (2, 6, "again"), (2, 3, "ok")]),
         ((WORDS, READ, WORDS), [(2, 3, "unasked"), (2, 3, "ok")]),
-        # a late reply of one drive takes nothing from the one that is asked now
+        # a late reply of one drive does not affect the current request
         (
             (READ, read_frame(3, 3201, 2), WORDS, reply_words(3, 7, 8)),
             [(2, 3, "none"), (2, 3, "unasked"), (3, 3, "ok")],

@@ -1,4 +1,4 @@
-"""Frames of another master are told from replies."""
+"""Frames of another master are distinguished from replies."""
 
 from __future__ import annotations
 
