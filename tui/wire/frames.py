@@ -25,7 +25,10 @@ _CRC = _table()
 
 
 def crc16(data: bytes | bytearray) -> int:
-    """Checksum of bytes: polynomial 16#A001, start 16#FFFF; 0 over a frame and its checksum."""
+    """Return the checksum of bytes: polynomial 16#A001, start 16#FFFF.
+
+    It is 0 for a frame including its checksum.
+    """
     table, crc = _CRC, 0xFFFF
     for byte in data:
         crc = (crc >> 8) ^ table[(crc ^ byte) & 0xFF]
@@ -33,12 +36,12 @@ def crc16(data: bytes | bytearray) -> int:
 
 
 def sealed(body: bytes) -> bytes:
-    """A whole frame: the body with its checksum, low byte first."""
+    """Return a whole frame: the body with its checksum, low byte first."""
     return body + crc16(body).to_bytes(2, "little")
 
 
 def frame(device: int, pdu: bytes) -> bytes:
-    """The frame of a request or reply: device, function and data, checksum."""
+    """Return the frame of a request or reply: device, function and data, checksum."""
     return sealed(bytes([device]) + pdu)
 
 
@@ -48,12 +51,12 @@ def is_whole(data: bytes | bytearray) -> bool:
 
 
 def read_frame(device: int, address: int, count: int) -> bytes:
-    """A read of so many words by function 3."""
+    """Return a request to read words with function 3."""
     return frame(device, bytes([3]) + _words(address, count))
 
 
 def write_frame(device: int, address: int, words: Sequence[int]) -> bytes:
-    """A write of words by function 16."""
+    """Return a request to write words with function 16."""
     head = bytes([16]) + _words(address, len(words))
     return frame(device, head + bytes([2 * len(words)]) + _words(*words))
 
@@ -61,13 +64,13 @@ def write_frame(device: int, address: int, words: Sequence[int]) -> bytes:
 def read_write_frame(
     device: int, read_address: int, count: int, write_address: int, words: Sequence[int]
 ) -> bytes:
-    """A write of words with a read of others in the same exchange, by function 23."""
+    """Return a request to write words and read others in the same exchange, with function 23."""
     head = bytes([23]) + _words(read_address, count, write_address, len(words))
     return frame(device, head + bytes([2 * len(words)]) + _words(*words))
 
 
 def hex_text(data: bytes) -> str:
-    """The bytes as manuals print them: `01 03 18 75`."""
+    """Return the bytes as manuals print them: `01 03 18 75`."""
     return data.hex(" ").upper()
 
 
@@ -90,7 +93,7 @@ class Pdu:
 
 
 def pdu_of(data: bytes, *, tcp: bool) -> Pdu | None:
-    """The parts of a frame; None of bytes that form none."""
+    """Return the parts of a frame; None for bytes that form none."""
     if tcp:
         return Pdu(data[6], data[7], data[8:]) if len(data) > MBAP_BYTES else None
     return Pdu(data[0], data[1], data[2:-2]) if len(data) >= SHORTEST_PDU + 2 else None
@@ -103,7 +106,8 @@ _PLANES = tuple(bytes(48 + (value >> bit & 1) for value in _BYTE_VALUES) for bit
 
 
 def _rows() -> tuple[tuple[int, ...], ...]:
-    """By bit of a checksum, which bits of (checksum ^ byte) come into it with the next byte."""
+    """Return, by bit of a checksum, the bits of (checksum ^ byte) that determine it after the
+    byte."""
     steps = [_step(1 << bit) for bit in range(8)]
     return tuple(tuple(k for k in range(8) if steps[k] >> bit & 1) for bit in range(_BITS))
 
@@ -119,15 +123,15 @@ _ROWS = _rows()
 
 
 def frame_ends(data: bytes | bytearray) -> dict[int, int]:
-    """By beginning, the end of the shortest whole frame there, as by is_whole().
+    """Return, by beginning, the end of the shortest whole frame there, as by is_whole().
 
-    Byte after byte, a lump of noise takes a line's thread hundreds of milliseconds, in which no
-    stop is sent. Here one long number holds one bit of the checksum of every beginning.
+    Checked byte by byte, a block of noise would take the line's thread hundreds of milliseconds, in
+    which no stop is sent. So one long number holds one checksum bit of every beginning.
     """
     count = len(data)
     if count < MIN_FRAME:
         return {}
-    # the byte with the lowest index in the lowest bit
+    # the byte with the lowest index is in the lowest bit
     text = bytes(data)[::-1]
     planes = [int(text.translate(plane), 2) for plane in _PLANES]
     every = (1 << count) - 1
@@ -142,7 +146,7 @@ def frame_ends(data: bytes | bytearray) -> dict[int, int]:
         held = 0
         for number in register:
             held |= number
-        # beginnings whose frame would end behind the last byte are none
+        # beginnings whose frame would end after the last byte do not count
         whole = ~held & ((1 << (count - length + 1)) - 1)
         while whole:
             lowest = whole & -whole
@@ -160,7 +164,7 @@ def _next(bit: int, register: list[int], mixed: list[int]) -> int:
 
 
 FAST = 19200
-"""Baud above which the silence between frames is FAST_SILENCE."""
+"""Baud rate above which the inter-frame gap is FAST_SILENCE."""
 FAST_SILENCE = 0.00175
 """Seconds."""
 SILENT_CHARACTERS = 3.5
@@ -168,13 +172,15 @@ _FORMAT = re.compile(r"8([NEO])([12])")
 
 
 def is_format(text: str) -> bool:
-    """Return True if a text is a character format that Modbus RTU can have: 8E1, 8N1, 8O1, 8N2
-    ..."""
+    """Return True if a text is a character format of Modbus RTU: 8E1, 8N1, 8O1, 8N2 ..."""
     return _FORMAT.fullmatch(text) is not None
 
 
 def bits_per_character(format_: str) -> int:
-    """Bits on the wire for one character: start, data, parity and stop bits. Raises ValueError."""
+    """Return the bits on the wire for one character: start, data, parity and stop bits.
+
+    Raises ValueError.
+    """
     match = _FORMAT.fullmatch(format_)
     if match is None:
         raise ValueError(f"{format_!r} is not a serial format")
@@ -182,10 +188,10 @@ def bits_per_character(format_: str) -> int:
 
 
 def character_seconds(baud: int, format_: str) -> float:
-    """Seconds for one character. Raises ValueError."""
+    """Return the seconds for one character. Raises ValueError."""
     return bits_per_character(format_) / baud
 
 
 def silent_seconds(baud: int, format_: str) -> float:
-    """Seconds of silence between two frames: 3.5 characters, 1.75 ms above 19 200 baud."""
+    """Return the inter-frame gap in seconds: 3.5 characters, 1.75 ms above 19 200 baud."""
     return FAST_SILENCE if baud > FAST else SILENT_CHARACTERS * character_seconds(baud, format_)

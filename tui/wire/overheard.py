@@ -1,4 +1,4 @@
-"""Requests in a frame overheard on a line; replies and noise have none."""
+"""Requests in a monitored frame; replies and noise contain none."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class OverheardRequest(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Request in few words."""
+        """Short description of the request."""
         kind = READS.get(self.function) or WRITES.get(self.function, "")
         if kind:
             text = _TEXTS[self.function in READS, self.words > 1]
@@ -44,12 +44,12 @@ class OverheardRequest(NamedTuple):
 
 
 def overheard_request(frame: bytes) -> OverheardRequest | None:
-    """The request in a whole frame, checksum included; None if it is a reply.
+    """Return the request in a whole frame with its checksum; None if it is a reply.
 
     A frame that may be either, as with function 6, counts as a request.
     """
     device, function = frame[0], frame[1]
-    # a reply of three bytes has the length of a request: coils may, registers do not
+    # a reply of three bytes is as long as a request; this is possible for coils, not registers
     if not fits_request(frame) or (function in COILS and fits_reply(frame)):
         return None
     if function not in {*READS, *WRITES, READ_WRITE}:

@@ -1,1 +1,1 @@
-"""Values of drives for programs of the plant: metrics for Prometheus, messages for a broker."""
+"""Values of drives for other programs of the plant: metrics for Prometheus, messages for MQTT."""

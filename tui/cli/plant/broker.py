@@ -15,11 +15,11 @@ import click
 from ..shared.errors import USAGE, Failure
 
 PASSWORD_SETTING = "DRIVEPANEL_MQTT_PASSWORD"
-"""Environment variable: the password for the broker."""
+"""Environment variable with the password for the broker."""
 PORTS = {"mqtt": 1883, "mqtts": 8883}
 SHAPE = "use mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS"
 NO_LEVEL = re.compile(r"[/+#\s\x00-\x1f\x7f]+")
-"""Characters with a meaning of their own in a topic, or forbidden in one."""
+"""Characters that are special or forbidden in a topic."""
 
 
 class Broker(NamedTuple):
@@ -34,7 +34,7 @@ class Broker(NamedTuple):
 
     @property
     def place(self) -> str:
-        """Scheme, host and port, for a person."""
+        """Scheme, host and port as text."""
         host = f"[{self.host}]" if ":" in self.host else self.host
         return f"{'mqtts' if self.tls else 'mqtt'}://{host}:{self.port}"
 
@@ -49,9 +49,9 @@ mqtt_password_option = click.option(
 
 
 def broker_of(url: str, password_file: Path | None) -> Broker:
-    """The broker of a URL. Raises UsageError, and Failure where MQTT is not installed.
+    """Return the broker of a URL. Raises UsageError, and Failure if MQTT is not installed.
 
-    A password in it is refused: every user of the computer sees what is typed.
+    A password in the URL is refused, because every user of the computer can see it.
     """
     try:
         parts = urlsplit(url)
@@ -88,7 +88,7 @@ def _password(file: Path | None) -> str | None:
 
 
 def _root(path: str) -> str:
-    """The topic of a URL; this computer's where none is named. Raises UsageError."""
+    """Return the topic of a URL (default: one for this computer). Raises UsageError."""
     root = unquote(path).strip("/")
     if not root:
         return f"drivepanel/{level(socket.gethostname())}"
@@ -100,7 +100,7 @@ def _root(path: str) -> str:
 
 
 def level(text: str) -> str:
-    """A text as one level of a topic."""
+    """Return a text as one level of a topic."""
     return NO_LEVEL.sub("_", text).strip("_") or "_"
 
 

@@ -1,4 +1,4 @@
-"""The drives whose values are published: found, read cycle by cycle, found again when lost."""
+"""The drives whose values are published: found, read cycle by cycle, found again after a loss."""
 
 from __future__ import annotations
 
@@ -25,29 +25,28 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 FIRST_LOOK_WITHIN = 15.0
-"""Seconds after which those drives are read that were found, at the latest."""
+"""Most seconds until the drives that were found are read."""
 FIND_AGAIN = 3.0
-"""Seconds between two looks for drives that are not there, one after the other on each line."""
+"""Seconds between two searches for missing drives, one after the other on each line."""
 SILENT_FOR_LONG = 60.0
 """Seconds without a good cycle after which the drive is identified again."""
 PLANT_LOOK_INTERVAL = 2.0
 RATE_LOOK_INTERVAL = 10.0
-"""Seconds between two looks whether the line keeps the wished cycle time."""
+"""Seconds between two checks of the cycle time of a line."""
 _LINE_FULL = "{name}: the line is full. A cycle takes up to {slowest:.1f} s."
 _CYCLE_KEPT = "{name}: the cycle time is as requested again."
 TIMEOUT_READ_AGAIN = 20.0
 """Seconds after which a drive's communication timeout is read again."""
 
 GATEWAY = "serve"
-"""Name of the program on a line whose clients may start motors."""
+"""Name of a program on a line whose clients may start motors."""
 
 Sign = Callable[[int], float | None]
-"""When the program that started the motor of a device was last heard; None where nobody is known to
-have."""
+"""Time of the last request of the client that started the motor of a device; None if unknown."""
 
 
 def no_sign(_device: int) -> float | None:
-    """Nobody is known to have started a motor."""
+    """Return None: no client is known to have started a motor."""
     return None
 
 
@@ -66,9 +65,10 @@ class PlantLine:
         return LineReport(self.name, self.opened.text, line.state, line.counters, drives)
 
     async def run(self) -> None:
-        """Read its drives until this is cancelled.
+        """Read the drives until this is canceled.
 
-        All are looked for before any is read: on a line full of polls that takes far longer.
+        All drives are searched for before any is read: on a line full of polls, the search takes
+        far longer.
         """
         search = DriveSearch()
         async with asyncio.TaskGroup() as tasks:
@@ -83,7 +83,7 @@ class PlantLine:
             await self.report_rate()
 
     async def report_rate(self) -> None:
-        """Say when the line does not carry the wished cycle time, and when it does again."""
+        """Report when the cycle time of --every is exceeded, and when it is met again."""
         full = False
         while True:
             await asyncio.sleep(RATE_LOOK_INTERVAL)
@@ -100,18 +100,18 @@ class PlantLine:
 
 
 class DriveSearch:
-    """Looks for the drives of one line, one at a time."""
+    """Searches for the drives of one line, one at a time."""
 
     def __init__(self) -> None:
         self.turn = asyncio.Lock()
         self.begin = asyncio.Event()
         """Set once the drives that were found are read."""
         self.retry = asyncio.Event()
-        """Set once each drive was looked for, and those not found may be looked for again."""
+        """Set once each drive was searched for; missing drives may then be searched for again."""
 
 
 class PlantDrive:
-    """One drive, from before it answers; lives in one loop."""
+    """One drive, also while it is not found; for one loop."""
 
     def __init__(
         self,
@@ -130,10 +130,9 @@ class PlantDrive:
         self._changed = changed
         self._sign = sign
         self.looked_for = asyncio.Event()
-        """Set once its identity was requested, with any result."""
+        """Set after its identity was requested, with any result."""
         self._session: DriveSession | None = None
         self.cycle: Snapshot | None = None
-        """Its last cycle."""
         self._error = f"Device {self.device} was not polled yet."
         self._contact: Contact = "not_polled"
         self._good = 0.0
@@ -145,7 +144,7 @@ class PlantDrive:
         return drive_status_of(self.device, self._session, self.cycle, now)
 
     async def run(self, search: DriveSearch) -> None:
-        """Find it, read it until it is lost, and again; ends by being cancelled only."""
+        """Find the drive, read it until it is lost, and repeat; ends only if it is canceled."""
         while True:
             session = await self._found(search)
             await search.begin.wait()
@@ -154,7 +153,7 @@ class PlantDrive:
             self._session = session
             await self._read(session)
 
-    # Who it is
+    # Identification
 
     async def _found(self, search: DriveSearch) -> DriveSession:
         while True:
@@ -168,7 +167,7 @@ class PlantDrive:
             await search.retry.wait()
 
     async def _requested(self) -> DriveSession | None:
-        """The drive, or None with why not, which is said when it changes."""
+        """Return the drive; None if it is not found, and report the reason when it changes."""
         from tui.bus.api import contact_of
 
         if self._sign(self.device) is not None:
@@ -193,7 +192,7 @@ class PlantDrive:
         return session
 
     async def _answers(self) -> None:
-        """Ask once, with little patience: others are on the line. Raises NoAnswer if silent."""
+        """Send one request with a short timeout, because others use the line. Raises NoAnswer."""
         from tui.bus.api import Priority
         from tui.bus.errors import DeviceException
         from tui.drive.profile import library
@@ -202,7 +201,7 @@ class PlantDrive:
 
         line, named = self._opened.line, self._target.profile_id
         with suppress(DeviceException):
-            # the status word answers at once where function 43 meets silence
+            # a read of the status word gets a reply even if function 43 gets none
             if named is None or not await read_status(
                 line, self.device, library.load(named), Priority.BACKGROUND
             ):
@@ -221,10 +220,10 @@ class PlantDrive:
         profile = session.profile
         return [profile.find(code).code for code in self._codes] or monitoring_codes(profile)
 
-    # Its cycles
+    # Cycles
 
     async def _read(self, session: DriveSession) -> None:
-        """Hand on its cycles until it was silent for long."""
+        """Pass its cycles on until it was silent for long."""
         from tui.session.monitor.monitor import Monitor
         from tui.session.sharing.observer_poller import ObserverPoller
 
@@ -260,7 +259,7 @@ class PlantDrive:
 
 
 async def _learn_timeout(session: DriveSession) -> None:
-    """Read again how long the drive waits for the line; what fails is asked again later."""
+    """Read the communication timeout of the drive again; after an error, it is read again later."""
     from tui.bus.api import Priority
     from tui.bus.errors import LineError
     from tui.session.monitor.timeout import read_timeout
@@ -273,10 +272,10 @@ async def _learn_timeout(session: DriveSession) -> None:
 
 
 def _is_orphan(session: DriveSession) -> bool:
-    """Return True if the program that started the motor has ended, and did not mean to leave it
-    running.
+    """Return True if the program that started the motor has ended without leaving it running.
 
-    So has the client of another program's gateway that commands the drive no more. Reads files.
+    Also if a client of another program's gateway started it, and no longer commands it. Reads
+    files.
     """
     from tui.session.starts.keeper import pids_absent
     from tui.session.starts.starts import Starts

@@ -1,7 +1,7 @@
 """Lines and drives in the text format of Prometheus, version 0.0.4.
 
-A value is in the base unit of its kind, which its name contains: seconds for ms and h, ratios for
-per cent. One that is not good is left out, so that a graph has a gap there and no old number.
+A value is in the base unit that its name contains: seconds for ms and h, ratios for percent. A
+value that is not good is omitted, so that a graph has a gap instead of an old number.
 """
 
 from __future__ import annotations
@@ -57,13 +57,13 @@ Labels = Mapping[str, str]
 
 
 class MetricSample(NamedTuple):
-    """One number of a metric."""
+    """One sample of a metric."""
 
     metric: str
     labels: Labels
     value: float
     suffix: str = ""
-    """Of the sample's own name: the buckets and the count of a histogram."""
+    """Suffix of the sample's name: bucket or count of a histogram."""
 
 
 class MetricHead(NamedTuple):
@@ -114,11 +114,11 @@ METRICS: Mapping[str, MetricHead] = {
     "word": MetricHead("gauge", "The raw value of a word of bits or names."),
     "value": MetricHead("gauge", "A value without a unit."),
 }
-"""All metrics but those of values with a unit, in the order of output."""
+"""All metrics except those of values with a unit, in the order of output."""
 
 
 def metrics_text(lines: Sequence[LineReport], version: str, now: float) -> str:
-    """All that is known of lines and drives; `now` is on the monotonic clock."""
+    """Return all metrics of lines and drives as text; `now` is on the monotonic clock."""
     by_metric: dict[str, list[MetricSample]] = {name: [] for name in METRICS}
     for sample in _samples(lines, version, now):
         by_metric.setdefault(sample.metric, []).append(sample)
@@ -134,7 +134,7 @@ def metrics_text(lines: Sequence[LineReport], version: str, now: float) -> str:
 
 
 def value_metric(unit: str) -> tuple[str, Decimal]:
-    """The name of the metric for values of a unit, and what they are multiplied by."""
+    """Return the name of the metric for values of a unit, and their factor."""
     if not unit:
         return "value", Decimal(1)
     end, factor = BASE_UNITS.get(unit, ("", "1"))
@@ -152,7 +152,7 @@ def _written(sample: MetricSample) -> str:
 
 
 def _escaped(text: str) -> str:
-    """A label's text as the format wants it."""
+    """Return a label's text with escaped characters."""
     return text.replace("\\", r"\\").replace("\n", r"\n").replace('"', r"\"")
 
 
@@ -236,7 +236,7 @@ def _drive_samples(where: Labels, drive: DriveStatus, now: float) -> Iterator[Me
 
 
 def _who(session: DriveSession, code: str) -> Labels:
-    """The code of a value, and the quantity that it is in every family, if it is one."""
+    """Return labels with the code of a value, and its quantity if it has one."""
     quantity = session.profile[code].quantity
     return {"code": code, **({"quantity": quantity} if quantity else {})}
 
@@ -253,7 +253,7 @@ def _value_samples(who: Labels, reading: Reading, now: float) -> Iterator[Metric
         yield MetricSample("word", who, reading.raw)
         return
     if reading.value.unsure:
-        return  # no document says what so high a raw value means: no number for a graph
+        return  # no document states the meaning of such a high raw value, so it is not a number
     if reading.value.taught:
         who = {**who, "taught": "true"}
     metric, factor = value_metric(reading.unit)

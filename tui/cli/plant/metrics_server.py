@@ -18,13 +18,13 @@ log = logging.getLogger(__name__)
 PATH = "/metrics"
 LONGEST_REQUEST = 8192
 ANSWERED_WITHIN = 10.0
-"""Seconds in which a client has asked and taken its answer; then it is let go."""
+"""Most seconds for a request and its reply; then the client is disconnected."""
 MOST_SCRAPES = 16
-"""Connections at a time; for one more the oldest of the busiest address is closed."""
+"""Most connections; one more closes the oldest of the host with the most connections."""
 
 
 class MetricsServer:
-    """Answers GET /metrics until it is closed; lives in one loop."""
+    """Answers GET /metrics until it is closed; for one loop."""
 
     def __init__(self, text: Callable[[], str]) -> None:
         self._text = text
@@ -35,7 +35,7 @@ class MetricsServer:
         """Host names accepted in requests, in addition to the address of each connection."""
 
     async def listen(self, host: str, port: int) -> tuple[str, int]:
-        """Listen at an address; returns it with the port that was found for 0. Raises OSError."""
+        """Listen at an address; return it, with the real port for port 0. Raises OSError."""
         own = gethostname().casefold()
         self._names = frozenset({host.casefold(), own, f"{own}.local", "localhost"})
         self._server = await asyncio.start_server(self._serve, host, port, limit=LONGEST_REQUEST)
@@ -43,7 +43,7 @@ class MetricsServer:
         return found[0], found[1]
 
     async def close(self) -> None:
-        """Take no more connections, and end those that are."""
+        """Accept no more connections, and end the present ones."""
         if self._server is not None:
             self._server.close()
         tasks = tuple(self._tasks)
@@ -81,11 +81,11 @@ class MetricsServer:
                 writer.close()
 
     def _answer(self, head: bytes, names: Collection[str]) -> bytes:
-        """Headers and body for a request to a server of these names."""
+        """Return headers and body for a request to a server with these names."""
         first, *headers = head.decode("latin-1").split("\r\n")
         method, _, rest = first.partition(" ")
         path = rest.partition(" ")[0].partition("?")[0]
-        # a web page may have this computer ask under a name of its own (DNS rebinding)
+        # a web page may send requests from this computer under its own name (DNS rebinding)
         if any(host not in names for host in _hosts(headers)):
             return _http(HTTPStatus.MISDIRECTED_REQUEST, "Use the address of this host.\n")
         if method not in ("GET", "HEAD"):
@@ -102,7 +102,7 @@ class MetricsServer:
 
 
 def _hosts(headers: Iterable[str]) -> Iterator[str]:
-    """The hosts that a request names, without their ports, in small letters."""
+    """Yield the hosts in a request, without ports, in small letters."""
     for header in headers:
         name, _, value = header.partition(":")
         if name.strip().casefold() == "host":
@@ -114,7 +114,7 @@ def _hosts(headers: Iterable[str]) -> Iterator[str]:
 def _http(
     status: HTTPStatus, text: str, kind: str = "text/plain; charset=utf-8", *, body: bool = True
 ) -> bytes:
-    """A whole answer; the connection ends with it."""
+    """Return a whole reply; the connection ends with it."""
     content = text.encode("utf-8", "replace")
     head = (
         f"HTTP/1.1 {status.value} {status.phrase}\r\nContent-Type: {kind}\r\n"

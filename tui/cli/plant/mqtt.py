@@ -1,7 +1,6 @@
-"""Publishing to a broker: everything retained, a last will, and again after each connection.
+"""Publication to a broker: retained messages, a last will, all repeated after each connection.
 
-Nothing is subscribed to, and messages that a broker sends anyway are discarded: none of them
-reaches a drive.
+No topic is subscribed to, and messages of a broker are discarded: none of them reaches a drive.
 """
 
 from __future__ import annotations
@@ -31,18 +30,18 @@ _client_log.setLevel(logging.CRITICAL)
 MQTT_KEEPALIVE = 10
 """Seconds; a broker sends the last will after 1.5 of these at the latest."""
 TRY_AGAIN_FIRST, TRY_AGAIN_LONGEST = 1.0, 30.0
-"""Seconds from a lost connection to the next try; each one that fails doubles it."""
+"""Seconds from a lost connection to the next attempt; each failed one doubles them."""
 LINES_EVERY = 10.0
 """Seconds between two messages about an unchanged line; the status is sent with them."""
 LOOKED_EVERY = 2.0
-"""Seconds after which is looked without anything new: what was read last may be too old by now."""
+"""Seconds after which values are checked even without new ones, because they may be too old."""
 LAST_WORD_WITHIN = 3.0
 
 Sights = Callable[[], Sequence[LineReport]]
 
 
 class MqttPublisher:
-    """Publishes lines and drives to a broker; lives in one loop."""
+    """Publishes lines and drives to a broker; for one loop."""
 
     def __init__(self, broker: Broker, sights: Sights) -> None:
         self._broker = broker
@@ -51,19 +50,19 @@ class MqttPublisher:
         self._ended = False
         self._trouble = ""
         self.connected = False
-        """True if a broker takes messages now."""
+        """True while a broker is connected."""
 
     def news(self) -> None:
-        """Something was read, or the state of a line has changed."""
+        """Note that a value was read, or that the state of a line has changed."""
         self._news.set()
 
     def end(self) -> None:
-        """Say that it is over; run() returns."""
+        """Publish `offline` and end; run() returns."""
         self._ended = True
         self._news.set()
 
     async def run(self) -> None:
-        """Publish until end(); a broker that is lost, or never connected, is retried."""
+        """Publish until end(); a lost or missing broker is retried."""
         delay, loop = TRY_AGAIN_FIRST, asyncio.get_running_loop()
         while not self._ended:
             begun = loop.time()
@@ -73,7 +72,8 @@ class MqttPublisher:
                 if not _is_mqtt(error):
                     log.exception("publishing failed")
                 self._lost(why_lost(error))
-            # one that is lost at once may be that of two programs with one topic: no haste
+            # two programs with the same topic disconnect each other at once: wait before the next
+            # attempt
             lasted = loop.time() - begun > TRY_AGAIN_LONGEST
             delay = TRY_AGAIN_FIRST if lasted else min(2 * delay, TRY_AGAIN_LONGEST)
             await self._wait_to_try(delay)
@@ -87,7 +87,7 @@ class MqttPublisher:
                 await asyncio.wait_for(self._news.wait(), left)
 
     async def _connected(self) -> None:
-        """One connection, from its begin until it is lost or all is over."""
+        """Handle one connection, from its start until it is lost or end() is called."""
         async with self._client() as client:
             self.connected = True
             if self._trouble:
@@ -146,13 +146,13 @@ class MqttPublisher:
     async def _status(
         self, client: aiomqtt.Client, status: str, timeout: float | None = None
     ) -> None:
-        # answered by the broker, which has then taken all that went before it
+        # the broker acknowledges this after it has received everything before it
         await client.publish(
             status_topic(self._broker.root), status, qos=1, retain=True, timeout=timeout
         )
 
     def _lost(self, why: str) -> None:
-        """Say once that the broker is not there, and why."""
+        """Report once that the broker is not connected, with the reason."""
         if not self._trouble:
             say(
                 f"drivepanel: {self._broker.place}: {why or 'the connection is lost'}. Retrying.",
@@ -162,7 +162,7 @@ class MqttPublisher:
 
 
 async def _until_lost(client: aiomqtt.Client) -> None:
-    """Throw away whatever comes; raises when the connection is lost."""
+    """Discard all messages; raises when the connection is lost."""
     async for _ in client.messages:
         pass
 
@@ -175,9 +175,10 @@ async def _send(client: aiomqtt.Client, messages: Mapping[str, str], sent: dict[
 
 
 def client_id(root: str) -> str:
-    """The same for each run that publishes there.
+    """Return a client id that is the same for each run with this topic.
 
-    A broker then ends what is left of the run before, with its last will, before it takes this one.
+    So a broker ends a remaining connection of the previous run, with its last will, before it
+    accepts this one.
     """
     text = f"{socket.gethostname()} {root}"
     return f"drivepanel-{hashlib.sha256(text.encode()).hexdigest()[:10]}"

@@ -42,7 +42,7 @@ def publish_options(
 
 
 def check_names(broker: Broker, names: list[str]) -> None:
-    """Raise UsageError where two lines would be published as one."""
+    """Raise UsageError if two lines would have the same topic."""
     try:
         line_topics(broker.root, names)
     except ValueError as error:
@@ -50,7 +50,7 @@ def check_names(broker: Broker, names: list[str]) -> None:
 
 
 def check_drives(lines: Sequence[ServedLine]) -> None:
-    """Raise UsageError if no drive of a line is named."""
+    """Raise UsageError if a line has no drive addresses."""
     from tui.session.connect.line_key import SIMULATED_PREFIX
 
     for line in lines:
@@ -62,7 +62,7 @@ def check_drives(lines: Sequence[ServedLine]) -> None:
 
 
 def read_drives(line: ServedLine, simulated: Sequence[int]) -> list[Target]:
-    """The drives of a line that are read: those named, else all of a simulated one."""
+    """Return the drives to read on a line: the named ones, else all of a simulated line."""
     devices = line.devices or tuple(simulated)
     return [Target(line.text, device, line.profiles.get(device)) for device in devices]
 

@@ -1,4 +1,4 @@
-"""Values of lines going out to the plant, from the first cycle to the last word."""
+"""Publication of values of lines, from the first cycle to the last message."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def sights_of(lines: Sequence[PlantLine]) -> list[LineReport]:
 
 @asynccontextmanager
 async def reading(lines: Sequence[PlantLine]) -> AsyncIterator[None]:
-    """While inside, the drives of the lines are read; an unforeseen error of that ends it."""
+    """Read the drives of the lines while inside; an unexpected error ends it."""
     async with asyncio.TaskGroup() as tasks:
         running = [tasks.create_task(line.run(), name=f"plant {line.name}") for line in lines]
         try:
@@ -55,7 +55,7 @@ async def reading(lines: Sequence[PlantLine]) -> AsyncIterator[None]:
 
 @asynccontextmanager
 async def metrics_at(lines: Sequence[PlantLine], host: str, port: int) -> AsyncIterator[str]:
-    """While inside, metrics are served; gives their URL. Raises Failure where that cannot be."""
+    """Serve metrics while inside; yield their URL. Raises Failure if they cannot be served."""
     server = MetricsServer(
         lambda: metrics_text(sights_of(lines), tui.__version__, time.monotonic())
     )

@@ -1,4 +1,4 @@
-"""State of lines and their drives at a moment, for publication to the plant."""
+"""State of lines and their drives at one moment, for publication."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class DriveStatus:
-    """One drive: its last cycle, or why there is none."""
+    """One drive: its last cycle, or the reason why there is none."""
 
     device: int
     session: DriveSession | None = None
-    """None while it was not found."""
+    """None if the drive was not found."""
     cycle: Snapshot | None = None
-    """As it was read: what was not read in it is not good."""
+    """Values that were not read in this cycle are not good."""
     error: str = ""
-    """Why there are no current values; empty where there are."""
+    """Reason why there are no current values; empty if there are."""
     contact: Contact = "not_polled"
     """Result of the last requests to it."""
 
@@ -41,7 +41,7 @@ class LineReport:
 def drive_status_of(
     device: int, session: DriveSession | None, cycle: Snapshot, now: float
 ) -> DriveStatus:
-    """A drive by its last cycle; one that is too old has no current value any more.
+    """Return the state of a drive from its last cycle; without current values if that is too old.
 
     `now` is on the monotonic clock.
     """
@@ -51,8 +51,8 @@ def drive_status_of(
 
 
 def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:
-    """The same without a good value: the program that reads the drive has not reached it for
-    long."""
+    """Return a cycle without good values: the program that reads the drive has not polled it
+    recently."""
     from tui.session.drive_state import drive_state
 
     readings = {code: reading.aged(now, -1.0) for code, reading in cycle.readings.items()}

@@ -52,7 +52,7 @@ class MessageFault(DocumentPart):
 
 
 class DriveMessage(DocumentPart, kw_only=True):
-    """The last cycle of a drive, or why there is none."""
+    """The last cycle of a drive, or the reason why there is none."""
 
     schema: Literal[1] = 1
     time: str | None
@@ -75,7 +75,7 @@ def status_topic(root: str) -> str:
 
 
 def line_topics(root: str, names: Iterable[str]) -> Mapping[str, str]:
-    """The topic of each line by its name. Raises ValueError where two have the same."""
+    """Return the topic of each line by its name. Raises ValueError if two are the same."""
     found: dict[str, str] = {}
     for name in names:
         topic = f"{root}/{level(name)}"
@@ -86,7 +86,7 @@ def line_topics(root: str, names: Iterable[str]) -> Mapping[str, str]:
 
 
 def drive_messages(root: str, lines: Sequence[LineReport]) -> dict[str, str]:
-    """The message of each drive, by its topic."""
+    """Return the message of each drive by its topic."""
     return {
         f"{root}/{level(line.name)}/{drive.device}": json_text(_drive(line, drive))
         for line in lines
@@ -95,7 +95,7 @@ def drive_messages(root: str, lines: Sequence[LineReport]) -> dict[str, str]:
 
 
 def line_messages(root: str, lines: Sequence[LineReport]) -> dict[str, str]:
-    """The message of each line, by its topic."""
+    """Return the message of each line by its topic."""
     return {
         f"{root}/{level(line.name)}/line": json_text(_line(line.text, line.state, line.counters))
         for line in lines

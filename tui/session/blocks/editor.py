@@ -1,7 +1,7 @@
-"""The blocks of one drive in an editor: watched, compared, and the work on them.
+"""Editor of the blocks of one drive: values, comparisons, and writes.
 
-The values come in through a worker of the line's loop, as long as somebody looks. What is
-proposed for them is in `proposals`.
+A worker of the line's loop reads the values while a screen shows them. Proposed assignments are in
+`proposals`.
 """
 
 from __future__ import annotations
@@ -77,7 +77,7 @@ def load_words(session: DriveSession) -> UserWords:
 
 
 def save_words(session: DriveSession, words: UserWords) -> str:
-    """Store them for this drive; return why that failed, or an empty string."""
+    """Store the words of this drive; return the error, or an empty string."""
     kept = _kept()
     kept[_key(session)] = [{"address": w.address, "format": w.format} for w in words]
     try:
@@ -101,7 +101,7 @@ def _file() -> Path:
 
 
 LOOK_EVERY = 1.0
-"""Seconds between two looks at the blocks."""
+"""Seconds between two reads of the blocks."""
 LOOK_AFTER_ERROR = 1.0
 
 
@@ -113,12 +113,12 @@ class BlockEditor:
     monitor: Monitor
     journal: Journal
     views: dict[str, BlockView] = field(default_factory=dict)
-    """Each block at its last comparison, by its id; replaced as a whole."""
+    """The last comparison of each block, by its id; replaced as a whole."""
     proposals: Proposals = field(init=False)
     words: UserWords = field(default_factory=tuple)
     word_raws: list[int | None] = field(default_factory=list)
     trouble: str = ""
-    """Why nothing can be read now; empty while that works."""
+    """Error of the last read; empty if it succeeded."""
     mapper: Mapper = field(init=False)
     _reader: LineWorker | None = None
     _verify: bool = False
@@ -142,12 +142,12 @@ class BlockEditor:
     # Reading
 
     def start(self) -> None:
-        """Begin to look."""
+        """Start reading and comparing."""
         self.stop()
         self._reader = self.session.line.spawn(self._watch, f"blocks {self.session.device}")
 
     def stop(self) -> None:
-        """Look no more; what is being written goes on."""
+        """Stop reading; a write in progress continues."""
         if self._reader is not None:
             self._reader.cancel()
             self._reader = None
@@ -193,7 +193,7 @@ class BlockEditor:
     # User words
 
     def assign_words(self, words: UserWords) -> None:
-        """Watch other words from now on, and keep them for this drive."""
+        """Monitor other words from now on, and store them for this drive."""
         self.words, self.word_raws = words, [None] * len(words)
         if wrong := save_words(self.session, words):
             self._say(wrong, OutcomeKind.REFUSED)
@@ -201,14 +201,14 @@ class BlockEditor:
     # Writing
 
     def not_now(self, block: Block) -> str:
-        """Why the slots of a block cannot be written in the present state, as Monitor knows it."""
+        """Return why the slots of a block cannot be written in the state that Monitor shows."""
         latest = self.monitor.latest
         if latest is None or latest.error or latest.state.motion in AT_REST:
             return ""
         return at_rest_only(block, latest.state.headline or latest.state.kind)
 
     def write_proposals(self, stamp: int | None = None) -> None:
-        """Write what is proposed; returns at once."""
+        """Write the proposals; returns immediately."""
         proposals = self.proposals
         plans = [proposals.plans[b.id] for b in proposals.blocks if b.id in proposals.plans]
 
@@ -216,7 +216,7 @@ class BlockEditor:
             texts = []
             for plan in plans:
                 if plan.block.effective == "after-reset":
-                    # whatever becomes of the writing: what was written by then waits
+                    # even if the write fails: slots that were already written wait for the reset
                     self.mapper.written |= {c.slot: c.new for c in proposals.changes(plan.block)}
                     self._wait_for_a_reset()
                 done = await write_assignment(
@@ -253,7 +253,7 @@ class BlockEditor:
         return intended(session.profile, session.device, outputs, inputs, raws, text)
 
     def exchange(self, agreed: ConfirmedWrite, stamp: int | None = None) -> None:
-        """Write through the outputs what a person has agreed to; returns at once."""
+        """Write confirmed values through the outputs; returns immediately."""
         session = self.session
 
         async def work(permit: Permit) -> str:
@@ -283,7 +283,7 @@ class BlockEditor:
     def _run(
         self, work: Callable[[Permit], Coroutine[Any, Any, str]], doing: str, stamp: int | None
     ) -> None:
-        """Do it as work on the drive: nothing before it, ended by a stop."""
+        """Queue work on the drive; refused while other work is in progress, canceled by a stop."""
         queue = self.session.work
         if queue.busy:
             self._say("Another command is in progress. Wait until it ends.", OutcomeKind.REFUSED)
@@ -313,7 +313,8 @@ class BlockEditor:
             self.session.line.spawn(self._see_again, f"blocks {self.session.device} again")
 
     async def _see_again(self) -> None:
-        """After a refusal the person looks at what the drive holds now, and may write again."""
+        """Read the slots again after a refusal, so that the person sees them and may write
+        again."""
         with suppress(LineError, DriveError):
             for id, plan in list(self.proposals.plans.items()):
                 view = await self.mapper.look(plan.block)

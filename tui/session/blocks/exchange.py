@@ -109,7 +109,7 @@ class _Exchange:
         try:
             reply, back = await self._send(known, held)
         finally:
-            # not before: a look at the rest before the frame would end the record
+            # not earlier: if standstill is read before the frame is sent, the record would end
             if recorded and self.session.starts is not None:
                 self.session.starts.sent(self.session)
         await self.checks.check_slots("after")
@@ -117,7 +117,7 @@ class _Exchange:
         return Exchanged(known, self._read(reply))
 
     async def _record_start(self, permit: Permit) -> bool:
-        """Record a start if a command word is among the outputs; return True if one is."""
+        """Record a start if a command word is among the outputs; return True if it is."""
         commands = {chart.command for chart in self.session.profile.data.charts}
         if commands.isdisjoint(parameter.code for parameter in self.targets):
             return False
@@ -295,8 +295,8 @@ class ExchangeChecks:
             raise AssignmentRefused(" ".join(problem.text for problem in wrong))
 
     async def check_state(self) -> None:
-        """Check the interlocks of a run command if an output is a command, and rest if one needs
-        it."""
+        """Check the interlocks of a run command, if an output is a command, and standstill if
+        required."""
         profile = self.session.profile
         state = await self.retrying.ask_state()
         stopped = [p.code for p in self.targets if p.access == "rw-stopped"]
@@ -328,7 +328,7 @@ class ExchangeChecks:
                 check_raw(parameter, raw, profile.names(parameter), scale)
 
     async def check_slots(self, when: str) -> None:
-        """Raise unless the slots are those that the person saw."""
+        """Raise AssignmentRefused if the slots have changed since the person saw them."""
         for plan in (self.outputs, self.inputs):
             if plan is None:
                 continue

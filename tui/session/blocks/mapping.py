@@ -3,7 +3,7 @@
 The value of a slot is compared with direct reads before and after. The slots of a scanner are read
 again after each use: a word is valid only if its slot is unchanged. The effective slots of an
 indirect block cannot be read until the drive's next reset. They are identified by the same
-comparison, with every parameter that they may hold. `proof` draws the conclusions.
+comparison, with every parameter that they may hold. `SlotEvidence` draws the conclusions.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ COMPARISONS_MOST = 2 * SURE
 
 
 class Force(StrEnum):
-    """True if a slot already returns the chosen parameter."""
+    """State of a slot: whether it already returns the chosen parameter."""
 
     ACTIVE = "active"
     PENDING = "pending"
@@ -135,11 +135,12 @@ class Mapper:
         return await self._asker.ask_raws(block.slots)
 
     async def look(self, block: Block, *, rounds: int = 1) -> BlockView:
-        """The slots of a block, what each brings, the same read directly, and the verdict.
+        """Return the slots of a block with their values, direct reads, and the result of comparing
+        them.
 
-        More rounds make surer: a slot differs only if every round says so, and is the same only
-        if every one says that. Where a slot seems to differ, it is looked at again anyway; where
-        all rounds were asked for, so is one that is not proved yet.
+        More rounds increase the certainty. A slot differs only if it differs in every round, and is
+        the same only if it is the same in every round. A slot that seems to differ is compared
+        again in any case. With SURE rounds, so is a slot that is not identified yet.
         """
         proof, view = SlotEvidence(self.session.profile, block), BlockView(block, ())
         for number in range(1, COMPARISONS_MOST + 1):
@@ -150,15 +151,15 @@ class Mapper:
         return view
 
     async def verify(self, block: Block) -> BlockView:
-        """The same, compared several times."""
+        """Return the same, after several comparisons."""
         return await self.look(block, rounds=SURE)
 
     async def _round(self, proof: SlotEvidence, earlier: BlockView) -> BlockView:
-        """One comparison: direct, block, direct, and the slots again."""
+        """Compare once: direct reads, the block, direct reads, and the slots again."""
         block, profile = proof.block, self.session.profile
         held = await self.slots(block)
         if held != earlier.raws:
-            # what was compared before says nothing of these slots
+            # earlier comparisons do not apply to these slots
             proof.begin()
         chosen = {
             slot: slot_target(profile, block, held[slot]) if slot in held else None
@@ -172,7 +173,7 @@ class Mapper:
         if words and block.effective == "at-once":
             still = await self.slots(block)
         if still != held:
-            # one slot was seen to change: others may have, there and back again
+            # one slot has changed: others may have changed and changed back
             proof.begin()
             changed = tuple(
                 Slot(slot, still.get(slot), verdict=SlotMatch.CHANGED) for slot in block.slots
@@ -203,7 +204,8 @@ class Mapper:
         return await self._asker.ask(codes) if codes else {}
 
     async def _words(self, block: Block, held: Mapping[str, int]) -> tuple[tuple[int, ...], str]:
-        """The words that the block brings, up to its last slot in use; else why there are none."""
+        """Return the words of the block up to its last slot in use; else the reason why there are
+        none."""
         plan = assignment(block, held)
         if plan is None:
             missing = ", ".join(slot for slot in block.slots if slot not in held)
@@ -224,7 +226,7 @@ class Mapper:
     def _slot(
         self, proof: SlotEvidence, now: Slot, was: Slot | None, direct: Mapping[str, Reading]
     ) -> Slot:
-        """A slot with its code, raw value, parameter and word, and what the words have told."""
+        """Return a slot with its value and the result of the comparison."""
         slot, raw, parameter, word = now.code, now.raw, now.parameter, now.word
         if was is not None and was.raw != raw:
             return Slot(slot, raw, parameter, verdict=SlotMatch.CHANGED)
@@ -244,11 +246,11 @@ class Mapper:
             and was is not None
             and not proof.fitted(slot, parameter.code)
         ):
-            # its value of the round in which it fitted
+            # its value from the round in which it matched
             return replace(was, verdict=verdict, force=force, brings=brings)
         text = self._text(parameter, through)
         if verdict is SlotMatch.DIFFERS and proof.block.direction == "read":
-            # it is not this parameter's value: it gets neither its scale nor its unit
+            # it is not the value of this parameter, so it has neither its scale nor its unit
             text = f"raw {word}"
         return replace(reported, word=through, text=text, verdict=verdict)
 
@@ -258,7 +260,7 @@ class Mapper:
 
     def _force(self, proof: SlotEvidence, slot: str, raw: int) -> tuple[Force, str]:
         """Return whether the slot is in force, and the value that it returns instead."""
-        # the monitor compares all the time, and may have proved it
+        # the monitor compares continuously, and may have identified it
         known = proof.block.effective == "at-once" or self.in_force().get(slot) == raw
         if known or proof.holds(slot, raw):
             return Force.ACTIVE, ""

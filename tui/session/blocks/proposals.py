@@ -1,6 +1,6 @@
-"""Proposals for the blocks of one drive, beside its present assignment; nothing is written here.
+"""Proposed assignments for the blocks of one drive; nothing is written here.
 
-It belongs to the thread of the screen and is kept until it is written or dropped.
+For the thread of the screen. A proposal is kept until it is written or discarded.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ class Proposals:
 
     session: DriveSession
     busy: Callable[[], bool]
-    """True if something is being written: nothing is proposed meanwhile."""
+    """Returns True while something is being written; nothing can be proposed then."""
     plans: dict[str, Assignment] = field(default_factory=dict)
     """Proposals by the id of the block, if they differ from the present assignment."""
     seen: dict[str, dict[str, int]] = field(default_factory=dict)
-    """The slots as the person saw them when a proposal was begun, by the id of the block."""
+    """The slots as the person saw them when the proposal began, by the id of the block."""
     _costs: dict[object, Saving] = field(default_factory=dict)
 
     @property
     def blocks(self) -> list[Block]:
-        """The blocks of the family, what is read first."""
+        """The blocks of the family, those for reading first."""
         return sorted(self.session.profile.data.blocks, key=lambda b: b.direction != "read")
 
     def today(self, block: Block) -> Assignment | None:
@@ -80,25 +80,26 @@ class Proposals:
         self.plans[plan.block.id] = plan
 
     def pick(self, block: Block, place: int, text: str) -> None:
-        """Propose what a person names for a slot. Raises MappingError, UnknownParameter."""
+        """Propose the typed content of a slot. Raises MappingError, UnknownParameter."""
         self.propose(pick(self.session.profile, self._base(block), place, text))
 
     def move(self, block: Block, place: int, step: int) -> None:
-        """Propose a slot's content one place up or down. Raises MappingError."""
+        """Propose to move a slot's content one place up or down. Raises MappingError."""
         self.propose(self._base(block).moved(place, step))
 
     def clear(self, block: Block, place: int) -> None:
-        """Propose an unused slot. Raises MappingError."""
+        """Propose to unmap a slot. Raises MappingError."""
         self.propose(self._base(block).cleared(place))
 
     def factory(self, block: Block) -> None:
-        """Propose what the drive left the factory with. Raises MappingError."""
+        """Propose the factory assignment. Raises MappingError."""
         self.propose(factory(self.session.profile, block))
 
     def best(self) -> Saving | None:
-        """Propose what saves most for what Monitor reads; what it saves, None where nothing.
+        """Propose the assignment that shortens Monitor's cycle most; return the savings, None if
+        none.
 
-        Raises MappingError where the block is not known or something is being written.
+        Raises MappingError if the block was not read yet or a write is in progress.
         """
         block = next((block for block in self.blocks if block.direction == "read"), None)
         if block is None:
@@ -116,7 +117,7 @@ class Proposals:
         return found
 
     def drop(self) -> None:
-        """Propose nothing any more."""
+        """Discard all proposals."""
         self.plans.clear()
         self.seen.clear()
 
@@ -141,7 +142,8 @@ class Proposals:
         )
 
     def saving(self) -> Saving | None:
-        """The time of a fast monitoring cycle under today's slots and under the proposed ones."""
+        """Return the time of a fast monitoring cycle with the present and with the proposed
+        slots."""
         today = [plan for block in self.blocks if (plan := self.today(block))]
         if not today:
             return None
@@ -157,6 +159,6 @@ class Proposals:
 
 
 def monitoring_stretches(session: DriveSession) -> list[Stretch]:
-    """For families without blocks: which neighbors to read in one request."""
+    """Return, for families without blocks, the adjacent words to read in one request."""
     codes = monitoring_codes(session.profile)
     return stretches(session.profile, codes, wire_timing(session))

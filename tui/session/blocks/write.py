@@ -135,7 +135,8 @@ class _Writing:
         return held
 
     async def _may(self) -> None:
-        """Raise unless the motor is known to be at rest, and the task may still write."""
+        """Raise AssignmentRefused unless the motor is at standstill and the task may still
+        write."""
         permit = self.writer.permit
         if permit is not None and (why := permit.refusal()):
             raise AssignmentRefused(self.so_far(why))

@@ -1,1 +1,1 @@
-"""A line for Modbus TCP clients: which drive is meant, what may be written, what is answered."""
+"""Line for Modbus TCP clients: the drive of a request, allowed writes, and replies."""

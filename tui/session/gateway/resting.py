@@ -65,8 +65,8 @@ class RestingDrives:
         reader = Reader(session)
         while True:
             timeout = _timeout(session) if learned is not None else UNKNOWN_TIMEOUT
-            # a motor that turns then did not obey, or another source has started it: the drive's
-            # own timeout must act
+            # a motor that turns did not obey, or another source has started it: the drive's own
+            # timeout must act
             if timeout is None or not (rests or clock.monotonic() - begun < timeout):
                 return
             rest = timeout / READS_PER_TIMEOUT - self._silence(session)

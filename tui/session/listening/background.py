@@ -21,7 +21,6 @@ from .place import PlaceToListen, line_to_listen
 from .summary import ListeningSummary
 
 FRAMES_HEARD = 1000
-"""Number of frames that are kept."""
 READ_WITHIN = 0.1
 """Seconds within which monitoring ends after a request."""
 SUMMED_UP_EVERY = 1.0
@@ -114,4 +113,4 @@ class HeardLine:
 
 
 def _forget(_: DecodedExchange) -> None:
-    """Exchanges are reported with their frames, and counted."""
+    """Ignore an exchange: its frames are reported, and it is counted."""

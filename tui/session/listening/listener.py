@@ -1,4 +1,4 @@
-"""Listener from bytes to counted exchanges with their values."""
+"""Conversion of received bytes to counted exchanges with their values."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class DecodedExchange:
 
 
 class LineListener:
-    """Listener to the traffic on one line; `character` and `silence` are the line's, in seconds.
+    """Listens to the traffic on one line; `character` and `silence` are the line's, in seconds.
 
     Times are those of a monotonic clock. A `character` of 0 means that pauses cannot be measured.
     """

@@ -51,7 +51,7 @@ class WriteTally:
 
     @property
     def every(self) -> float | None:
-        """Seconds from one to the next, on average; None of a single one."""
+        """Average seconds from one write to the next; None for a single one."""
         return (self.last - self.first) / (self.times - 1) if self.times > 1 else None
 
 
@@ -66,7 +66,7 @@ class ReadTally:
 
     @property
     def every(self) -> float | None:
-        """Seconds from one to the next, on average; None of a single one."""
+        """Average seconds from one read to the next; None for a single one."""
         return (self.last - self.first) / (self.times - 1) if self.times > 1 else None
 
 
@@ -107,7 +107,7 @@ class DriveTally:
         return self.turnaround_sum / self.answered if self.answered else None
 
     def pause_until(self, now: float) -> float:
-        """The longest time without a keep-alive read, including the present one;"""
+        """Return the longest pause in polling, including the present one, in seconds."""
         return max(self.longest_pause, now - self.fed if self.fed is not None else 0.0)
 
     def take(

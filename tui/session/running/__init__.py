@@ -1,1 +1,1 @@
-"""A motor that runs as long as a command or a block does: started, followed, brought to rest."""
+"""Motor that runs during a command or a block: started, monitored, stopped."""

@@ -1,4 +1,4 @@
-"""The end of a command that would run on: by a signal, after a time, with its reader."""
+"""End of a command that would continue: by a signal, after a time, or when its reader closes."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from ..signals import handled, signal_name
 
 @dataclass(slots=True)
 class Ending:
-    """True if the command is to end, and why; belongs to the loop."""
+    """End of a command, with its reason; for one loop."""
 
     event: asyncio.Event = field(default_factory=asyncio.Event)
     why: str = ""
     number: int = 0
-    """The signal that ended it; 0 where none did."""
+    """The signal that ended it; 0 if none did."""
 
     def end(self, why: str, number: int = 0) -> None:
-        """End the command; the first reason stays."""
+        """End the command; the first reason is kept."""
         if not self.why:
             self.why, self.number = why, number
         self.event.set()
 
     @contextmanager
     def by_signals(self) -> Iterator[None]:
-        """While inside, signals end the command and nothing else, however often they come."""
+        """While inside, every signal only ends the command, however often it arrives."""
         loop = asyncio.get_running_loop()
 
         def handle(number: int, _frame: FrameType | None) -> None:

@@ -57,9 +57,9 @@ class MotorRun:
     by: str
     """Program that stops the motor at the end, for the journal and other programs."""
     prepare: Callable[[], Awaitable[None]]
-    """Does what must be done before the run command: arming, taking control."""
+    """Prepares the run command: arms the drive and takes control."""
     command: Callable[[], Awaitable[None]]
-    """Gives the run command and waits until the motor runs."""
+    """Sends the run command and waits until the motor runs."""
     seconds: float | None = None
     """The duration; None for no limit."""
     leave_running: bool = False
@@ -77,7 +77,7 @@ class MotorRun:
         self._stops = self.console.session.work.stops
 
     async def carry_out(self) -> None:
-        """Run the motor until the end; stop it then, whatever went wrong, or leave it running.
+        """Run the motor until the end; then stop it, even after an error, or leave it running.
 
         Raises MotorStopped if it stopped on its own, and NotStopped. Returns after standstill.
         """
@@ -111,7 +111,7 @@ class MotorRun:
         return left_alone_text(self.console.session, watch=self.watch)
 
     async def _started(self) -> bool:
-        """Give the run command; False where the end came first."""
+        """Send the run command; return False if the end came first."""
         if self.ending.event.is_set():
             return False
         start = asyncio.create_task(self._start())
@@ -139,7 +139,7 @@ class MotorRun:
     async def _follow(self) -> str:
         """Show the motor until the end; raises MotorStopped if it stops on its own.
 
-        Returns the source of a stop before the end, if it was not yet seen at rest.
+        Returns the source of a stop before the end, if its standstill was not seen yet.
         """
         begun = time.monotonic()
         seen, rest = 0, 0
@@ -170,7 +170,7 @@ class MotorRun:
         return work.stopped_by if is_other else ""
 
     def _at_rest(self, latest: Snapshot) -> bool:
-        """Return True if it is seen not to run; a drive may stay in its quick stop at 0 Hz."""
+        """Return True if the motor is not running; a drive may stay in its quick stop at 0 Hz."""
         if latest.error:
             return False
         kind = latest.state.kind
@@ -178,13 +178,13 @@ class MotorRun:
         return at_zero or kind in ("fault", "stopped", "ready", "blocked")
 
     def _frequency(self, latest: Snapshot) -> float | None:
-        """The output frequency in Hz, as far as it is known."""
+        """Return the output frequency in Hz; None if unknown."""
         frequency = self.console.session.profile.quantity("output_frequency")
         reading = with_text(latest.readings).get(frequency.code) if frequency else None
         return reading.number if reading is not None else None
 
     def _stopped_on_its_own(self, latest: Snapshot) -> MotorStopped:
-        """The reason why the motor no longer runs."""
+        """Return the error with the reason why the motor no longer runs."""
         if fault := latest.state.fault:
             return MotorTripped(
                 f"Device {self.console.device} tripped: {fault.code}, {fault.name}. Check the"
@@ -201,9 +201,9 @@ class MotorRun:
         return MotorStopped(f"Device {self.console.device} no longer runs: {state}. {text}")
 
     async def _bring_to_rest(self) -> None:
-        """Stop the motor and wait for its standstill; on a lost line as soon as that is back.
+        """Stop the motor and wait for standstill; on a lost line, as soon as it is connected again.
 
-        Raises NotStopped where the drive answers and does not stop.
+        Raises NotStopped if the drive answers and does not stop.
         """
         session, stopper, failed = self.console.session, self.fleet.stopper, 0
         why = self.ending.why or "the run has ended"
@@ -220,20 +220,20 @@ class MotorRun:
             if self._stands():
                 self.observer.report("stopped", f"Device {session.device} is at standstill.")
                 return
-            # a ramp may be longer than a stop is followed
+            # a ramp may take longer than a stop is monitored
             if not bad and latest_of(self.console).state.kind != "stopping":
                 failed += 1
             if failed == STOPS_THAT_MAY_FAIL:
                 raise NotStopped(f"Device {session.device}: {report.text}")
 
     def _stands(self) -> bool:
-        """Return True if the motor is seen at rest, though the drive did not take the stop."""
+        """Return True if the motor is at standstill, even if the drive did not accept the stop."""
         latest = latest_of(self.console)
         enabled = latest.state.motion == "running"
         return self._at_rest(latest) and not enabled and self._frequency(latest) == 0
 
     async def _line_was_bad(self, since: float) -> bool:
-        """Wait until the drive answers; whether it failed to at any time since."""
+        """Wait until the drive answers; return True if it failed to answer since a time."""
         requested, bad, reported = time.monotonic(), False, False
         while True:
             latest = latest_of(self.console)

@@ -1,4 +1,4 @@
-"""A drive that is about to be commanded: watched, its state and its timeout known."""
+"""Preparation of a command: the drive's state and its communication timeout are read."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ COMMAND_POLL_INTERVAL = 0.02
 WATCH_PERIOD = 0.25
 """Target cycle time of the monitor in seconds."""
 FIRST_TRIES, FIRST_WITHIN = 3, 5.0
-"""Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word that
-it does not have may meet silence, which is not an answer of any kind."""
+"""Cycles that may fail, and seconds, before the drive counts as silent. Some drives do not answer
+reads of words that they lack."""
 LEARNT_WITHIN = 10.0
-"""Seconds in which a drive's communication timeout is read on a quick line: words that it lacks
-meet silence, and a small computer is slow."""
+"""Seconds in which a drive's communication timeout is read on a fast line. Some drives do not
+answer reads of words that they lack, and a small computer is slow."""
 
 
 class NotLearned(LineError):
@@ -35,7 +35,7 @@ class NotLearned(LineError):
 
 
 def latest_of(console: DriveConsole) -> Snapshot:
-    """The last cycle of a drive that is watched."""
+    """Return the last cycle of a polled drive."""
     latest = console.latest
     assert latest is not None, "a console is handed out after the first cycle"
     return latest
@@ -49,14 +49,15 @@ async def first_cycle(console: DriveConsole) -> None:
         latest = console.latest
         tried = latest is not None and latest.cycle >= FIRST_TRIES
         if latest is not None and not latest.error and (latest.state.kind != "unknown" or tried):
-            return  # what decides about its chart may come a cycle later
+            return  # the word that selects the chart may be read one cycle later
         if latest is not None and tried and loop.time() > end:
             raise LineError(latest.error)
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
 
 
 async def learned_timeout(fleet: Fleet, console: DriveConsole) -> TimeoutWatch | None:
-    """A kept drive's watch over the line; None where it has none, or it is off.
+    """Return the communication timeout of a drive that is kept alive; None if it has none, or it is
+    off.
 
     Raises NotLearned.
     """
@@ -76,9 +77,9 @@ async def learned_timeout(fleet: Fleet, console: DriveConsole) -> TimeoutWatch |
 
 
 async def outcome_of(commander: Commander, give: Callable[[], None]) -> Outcome | None:
-    """Give a command and wait for its outcome; None if a newer command superseded it.
+    """Send a command and wait for its outcome; None if a newer command superseded it.
 
-    Raises OrderRefused if it is not even begun.
+    Raises OrderRefused if it is not started.
     """
     work = commander.session.work
     before = work.outcome

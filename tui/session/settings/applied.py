@@ -86,7 +86,7 @@ class LinkChange:
     device: int
     """The address at which the drive will answer; 0 if its server is switched off."""
     line: str
-    """The line as a person must type it then; unchanged if the setting may be of another port."""
+    """The LINE to type then; unchanged if the setting may belong to another port."""
     at_once: bool
     """True if it takes effect immediately, False if after a reset of the drive."""
 

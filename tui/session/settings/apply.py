@@ -1,5 +1,4 @@
-"""Application of staged edits to a drive: each value is read before, written once, read back,
-recorded.
+"""Writing of staged edits: each value is read, written once, read back and recorded.
 
 A value that another source has changed in the meantime is not overwritten. An edit that could not
 be written stays staged. Nothing is printed: a screen or a command shows the results.
@@ -113,7 +112,7 @@ class _Work:
 
     @property
     def missed(self) -> list[str]:
-        """Codes of the edits that the drive has not taken so far."""
+        """Codes of the edits that were not written so far."""
         return [r.edit.code for r in self.results if not r.done]
 
     def missed_base(self, edit: Edit) -> str:
@@ -294,5 +293,5 @@ class _Work:
         try:
             return left.now(self.session.profile, raws, self.retrying.lacking)
         except DriveError:
-            # under the scales of now a value has no place: it stays as it was typed
+            # a value may not exist with the present scales: it stays as it was typed
             return Edits(tuple(replace(e, old=raws.get(e.code, e.old)) for e in left.requested))

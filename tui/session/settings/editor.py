@@ -256,7 +256,7 @@ class Editor:
         self._run(work, stamp)
 
     def factory(self, stamp: int | None = None) -> None:
-        """Recall the factory settings."""
+        """Restore the factory settings."""
 
         async def work(permit: Permit) -> str:
             confirmed = self.marks.confirmed

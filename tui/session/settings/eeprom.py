@@ -1,4 +1,4 @@
-"""Commands that save a drive's settings to its EEPROM, or recall its factory settings."""
+"""Commands that save a drive's settings to its EEPROM, or restore its factory settings."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from ..work import Permit
 from .write import Writer, device_refusal
 
 SAVING_LONGEST = 10.0
-"""Seconds that a drive may take to save or to recall."""
+"""Most seconds that a drive may take to save or restore settings."""
 SAVE_POLL_INTERVAL = 0.1
 SETTINGS_NAMED = 8
 """Number of settings that a text names at most."""
@@ -42,7 +42,7 @@ async def save_to_eeprom(session: DriveSession, journal: Journal, permit: Permit
 async def factory_reset(
     session: DriveSession, journal: Journal, permit: Permit, *, confirmed: Collection[str] = ()
 ) -> str:
-    """Recall the factory settings, read them, and return the result as text.
+    """Restore the factory settings, read them, and return the result as text.
 
     Raises MemoryRefused (wrong state, unknown command, or an unverified word that is not among
     `confirmed`), DeviceException with the meaning of the drive's refusal, and the line's other
@@ -86,7 +86,7 @@ async def _carry_out(
         word |= held & 0xFFFF & ~order.raw
     raw = from_words(parameter, [word])
     try:
-        # the drive takes the order back by itself: what it holds afterwards proves nothing
+        # the drive resets the command itself, so reading it back proves nothing
         await writer.write_parameter(parameter, raw, why=why, read_back=False)
     except DeviceException as error:
         text = device_refusal(profile, parameter, error, retrying.headline).rstrip(".")
@@ -98,7 +98,7 @@ async def _carry_out(
 
 
 async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
-    """Raise MemoryRefused unless the drive is known to be at rest, and has settings to recall."""
+    """Raise MemoryRefused unless the drive is known to be at rest, and has settings to restore."""
     state = await retrying.ask_state()
     if state not in AT_REST:
         raise MemoryRefused(
@@ -120,8 +120,7 @@ async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
 
 
 async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
-    """Wait until the drive has reset the bit or value of the command, and writes its EEPROM no
-    more."""
+    """Wait until the drive has reset the command, and has finished writing its EEPROM."""
     profile = retrying.session.profile
     status = profile.quantity("extended_status_word")
     reported = [order.done.parameter] if order.done else []

@@ -33,7 +33,7 @@ async def stage_typed(
     retrying = RetryingReader(session)
     await retrying.ask_many(codes + sorted(sources) + follow)
     edits = Edits()
-    # scale sources first: what is typed for a ramp holds under the new scale
+    # scale sources first: a typed ramp applies with the new scale
     for code, value in sorted(pairs, key=lambda pair: pair[0] not in sources):
         if profile[code].access == "r":
             raise ValueRefused(f"{code} can only be read.")

@@ -1,1 +1,1 @@
-"""Which motors were started, on record before the frame goes out."""
+"""Records of motor starts, written before the run frame is sent."""

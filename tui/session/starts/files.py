@@ -1,8 +1,8 @@
-"""The files of start records: written whole or not at all, and set aside if damaged.
+"""Files of start records: written completely or not at all, and renamed if damaged.
 
-They are in the state folder of the user, and in the folder of a group of users. The user's own
-files survive a restart of the computer. From those of the group, a keeper that another user has
-started knows which motors to stop once the program that started them has ended.
+They are in the user's state folder, and in the folder of a group of users. The user's files survive
+a restart of the computer. The files of the group show a keeper of another user which motors to stop
+after their program has ended.
 """
 
 from __future__ import annotations
@@ -30,26 +30,27 @@ ENDING = ".json"
 LONGEST_RECORD = 100_000
 """Bytes of a file that may be a record."""
 SHARED_RECORD, SHARED_RECORDS = 0o660, 0o770
-"""Modes of a file and a folder that users of a group share; whose it is comes from above."""
+"""Modes of a file and a folder that users of a group share; the group is that of the parent
+folder."""
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
 """Errors of file systems that cannot flush a folder; the file itself was flushed."""
 
 
 class StartFiles:
-    """One file for each start; a drive's starts by two programs never share a file.
+    """One file for each start; two programs never share a file.
 
-    So no program writes over, or takes away, what another has just put down.
+    So no program overwrites or removes the record of another.
     """
 
     def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self.folder = folder
         self._shared = shared
-        """True if the group of the folder above may read, write and take away what lies here."""
+        """True if the group of the parent folder may read, write and remove the files."""
 
     def write_record(self, record: StartRecord, wanted: Callable[[], bool]) -> None:
-        """Put a record on the disk, flushed; not if it is no longer `wanted` at the last moment.
+        """Write a record and flush it, unless it is no longer `wanted` at the last moment.
 
-        Raises OSError; an older record of the same start then stays as it was.
+        Raises OSError; an older record of the same start then remains unchanged.
         """
         import msgspec
 
@@ -72,7 +73,7 @@ class StartFiles:
                 part.unlink(missing_ok=True)
 
     def remove(self, unwanted: Callable[[StartRecord], bool]) -> None:
-        """Take away records, flushed; what cannot be removed is logged."""
+        """Remove records, flushed; errors are logged."""
         removed = False
         for path, record in self._stored():
             if not unwanted(record):
@@ -87,7 +88,7 @@ class StartFiles:
                 sync_folder(self.folder)
 
     def records(self) -> list[StartRecord]:
-        """All records; damaged files are set aside and logged."""
+        """Return all records; damaged files are renamed and logged."""
         return [record for _, record in self._stored()]
 
     def _stored(self) -> Iterator[tuple[Path, StartRecord]]:
@@ -112,16 +113,16 @@ class StartFiles:
 
 
 def _make_shared(folder: Path) -> None:
-    """Make a folder for the group of the one that it lies in, whose mark it takes over."""
+    """Create a folder with the group and mode bits of its parent."""
     folder.mkdir(mode=SHARED_RECORDS, exist_ok=True)
     mode = stat.S_IMODE(folder.stat().st_mode)
     if mode & SHARED_RECORDS != SHARED_RECORDS:
-        # by the umask; a hardened service has another one, and may set no mark of a group
+        # the umask removed bits; a hardened service may not set the group bit
         folder.chmod(mode | SHARED_RECORDS)
 
 
 def _name(record: StartRecord) -> str:
-    """A name of its own for each program's starts of a drive, with something to read in it."""
+    """Return a file name that is unique for each program's start of a drive, and readable."""
     origin = (record.line, record.device, record.boot_id, *record.process, record.started)
     digest = hashlib.sha256(repr(origin).encode()).hexdigest()[:12]
     readable = re.sub(r"[^A-Za-z0-9]+", "-", record.line).strip("-")[:40]
@@ -145,7 +146,7 @@ def _read(path: Path) -> StartRecord | None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Flush the names in a folder, where the system can."""
+    """Flush the names in a folder, if the system supports it."""
     if os.name != "posix":
         return
     opened = os.open(folder, os.O_RDONLY)
@@ -159,14 +160,14 @@ def sync_folder(folder: Path) -> None:
 
 
 def start_records(folder: Path | None) -> StartFiles | StartFolders:
-    """The records below a folder alone, or those of this user with those of the group."""
+    """Return the records of one folder, or those of this user and the group."""
     if folder is not None:
         return StartFiles(folder / "starts")
     return StartFolders(state_folder() / "starts")
 
 
 class StartFolders:
-    """The records of this user with those of the group, as one store."""
+    """The records of this user and of the group, as one store."""
 
     def __init__(self, folder: Path) -> None:
         self._own = StartFiles(folder)
@@ -177,9 +178,9 @@ class StartFolders:
         return self._own.folder
 
     def write_record(self, record: StartRecord, wanted: Callable[[], bool]) -> None:
-        """Put a record on the disk, flushed, then where the group sees it.
+        """Write a record and flush it, then write it for the group.
 
-        Raises OSError where the first fails; what the group is not told is logged.
+        Raises OSError if the first fails; an error of the second is logged.
         """
         self._own.write_record(record, wanted)
         for shared in self._shared():
@@ -191,18 +192,19 @@ class StartFolders:
                 )
 
     def remove(self, unwanted: Callable[[StartRecord], bool]) -> None:
-        """Take away records; what cannot be removed is logged."""
+        """Remove records; errors are logged."""
         for files in (self._own, *self._shared()):
             files.remove(unwanted)
 
     def records(self) -> list[StartRecord]:
-        """All records, each once."""
+        """Return all records, each once."""
         every = [record for files in (self._own, *self._shared()) for record in files.records()]
         return list(dict.fromkeys(every))
 
     @staticmethod
     def _shared() -> tuple[StartFiles, ...]:
-        """That of the group, found again: a service makes its folder when it starts."""
+        """Return the folder of the group, searched each time: a service creates it when it
+        starts."""
         folder = group_folder()
         if os.name != "posix" or not os.access(folder, os.R_OK | os.W_OK | os.X_OK):
             return ()

@@ -1,4 +1,4 @@
-"""True if a program of this machine still lives, also where its number was given to another."""
+"""Check if a program of this computer still runs, even if its process id was reused."""
 
 from __future__ import annotations
 
@@ -7,17 +7,17 @@ import subprocess
 from pathlib import Path
 
 ENDED = frozenset("ZXx")
-"""States of a process that runs no more, though nobody has fetched its exit status yet."""
+"""States of a process that has ended, but whose exit status was not read yet."""
 PS_PATIENCE = 5.0
 """Seconds for `ps`, where there is no /proc."""
 _STATE, _START = 0, 19
-"""Fields 3 and 22 of /proc/PID/stat, counted behind the name, which may hold spaces."""
+"""Fields 3 and 22 of /proc/PID/stat, counted after the name, which may contain spaces."""
 
 
 class Processes:
-    """The programs of this machine, by number and by when they were started.
+    """Processes of this computer, identified by number and start time.
 
-    From /proc; where there is none from `ps`. On Windows nothing is known: all count as living.
+    From /proc, else from `ps`. On Windows nothing is known, and all count as running.
     """
 
     def __init__(self, proc: Path = Path("/proc")) -> None:
@@ -26,7 +26,7 @@ class Processes:
     def boot_id(self) -> str:
         """Return an id of this run of the computer; empty if it is not known.
 
-        Without it a program's start still distinguishes them.
+        Without it, the start time still distinguishes programs.
         """
         try:
             return (self._proc / "sys/kernel/random/boot_id").read_text(encoding="ascii").strip()
@@ -34,7 +34,8 @@ class Processes:
             return ""
 
     def started(self, pid: int) -> str | None:
-        """When a program was started, comparable only; empty if unknown, None if it ended."""
+        """Return the start time of a process, only for comparison; empty if unknown, None if it
+        ended."""
         if os.name != "posix":
             return ""
         if not (self._proc / "self").exists():
@@ -51,12 +52,12 @@ class Processes:
         return None if fields[_STATE] in ENDED else fields[_START]
 
     def is_same_boot(self, boot_id: str) -> bool:
-        """False if the computer was started since; True where it does not say."""
+        """Return False if the computer was restarted since; True if that is unknown."""
         here = self.boot_id()
         return not (boot_id and here) or boot_id == here
 
     def lives(self, boot_id: str, pid: int, started: str) -> bool:
-        """Return True if the program still lives that was noted so; in doubt it does."""
+        """Return True if the recorded program still runs; if in doubt, True."""
         if not self.is_same_boot(boot_id):
             return False
         now = self.started(pid)
@@ -64,15 +65,14 @@ class Processes:
 
 
 def _is_hidden(pid: int) -> bool:
-    """Return True if a program of another user runs that /proc does not show to this one
-    (hidepid)."""
+    """Return True if /proc hides a running program of another user (hidepid)."""
     try:
-        os.kill(pid, 0)  # no signal: it asks whether there is such a program
+        os.kill(pid, 0)  # signal 0 only checks if the process exists
     except PermissionError:
         return True
     except (OSError, OverflowError):
         return False
-    return False  # it is this user's, and ended meanwhile
+    return False  # it belonged to this user, and ended in the meantime
 
 
 def _by_ps(pid: int) -> str | None:

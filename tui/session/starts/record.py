@@ -132,7 +132,7 @@ OVERTAKEN = "a stop came first"
 
 
 class StartNotRecorded(DriveError):
-    """A start could not be put on record, so the motor is not to be started."""
+    """A start could not be recorded, so the motor must not be started."""
 
     def __init__(self, device: int, folder: Path, reason: str) -> None:
         self.device, self.folder, self.reason = device, folder, reason
@@ -144,7 +144,7 @@ class StartNotRecorded(DriveError):
 
 
 class StartOvertaken(StartNotRecorded):
-    """A stop came while the start was being recorded: the motor is not to be started at all."""
+    """A stop arrived while the start was being recorded: the motor must not be started."""
 
     def __init__(self, device: int, folder: Path) -> None:
         super().__init__(device, folder, OVERTAKEN)

@@ -1,1 +1,1 @@
-"""Frames as other programs read them: pcapng, as Modbus/TCP or as bytes of a serial line."""
+"""Frames for other programs: pcapng with Modbus/TCP packets or raw serial frames."""

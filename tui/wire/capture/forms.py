@@ -1,7 +1,7 @@
-"""Frames as packets: as Modbus/TCP, which every reader decodes, or as they went over the line.
+"""Frames as packets: as Modbus/TCP, which every reader decodes, or as raw serial frames.
 
-As Modbus/TCP each drive is a server of its own, at 192.0.2.N for the device N; that network, and
-that of the master, are those of documents and belong to nobody.
+As Modbus/TCP, each drive is a server of its own, at 192.0.2.N for the device N. That network and
+the master's are reserved for documentation.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ READ_RAW = (
     'tshark -o \'uat:user_dlts:"User 0 (DLT=147)","mbrtu","0","","0",""\''
     " -o mbrtu.crc_verification:TRUE -r FILE"
 )
-"""Decoder of a file of raw frames; Wireshark has the same under DLT_USER."""
+"""Command that decodes a file of raw frames; Wireshark has the same setting under DLT_USER."""
 _TCP, _PUSH_AND_ACK, _WINDOW, _TIME_TO_LIVE = 6, 0x18, 0xFFFF, 64
 _NO_FRAGMENTS = 0x4000
 
@@ -34,45 +34,45 @@ class Packet:
 
 
 class PacketForm(Protocol):
-    """Makes packets of the frames of one line, in their order."""
+    """Makes the packets of one line's frames, in their order."""
 
     link_type: int
 
     def frame_packet(self, device: int, pdu: bytes, *, request: bool) -> Packet:
-        """The packet of a whole frame: function and data, without the checksum."""
+        """Return the packet of a whole frame: function and data, without the checksum."""
         ...
 
     def noise_packet(self, data: bytes) -> Packet | None:
-        """The packet of bytes that form no frame; None if the format has none."""
+        """Return the packet of bytes outside any frame; None if the format has none."""
         ...
 
 
 class RtuForm:
-    """Frames with their checksums, and what forms none, as bytes."""
+    """Raw frames with their checksums, and bytes outside any frame."""
 
     link_type = LINK_USER_0
 
     def frame_packet(self, device: int, pdu: bytes, *, request: bool) -> Packet:
-        """The frame as it was on the line."""
+        """Return the frame as it was on the line."""
         return Packet(sealed(bytes([device]) + pdu))
 
     def noise_packet(self, data: bytes) -> Packet | None:
-        """The bytes as they were."""
+        """Return the bytes unchanged."""
         return Packet(data, "forms no frame")
 
 
 @dataclass(slots=True)
 class _Connection:
-    """One master's connection to one drive: what each side has sent so far."""
+    """One master's connection to one drive, with the bytes that each side has sent."""
 
     device: int
     transaction: int = 0
     sent: dict[bool, int] = field(default_factory=lambda: {True: 1, False: 1})
-    """Bytes by whether they were of requests; they count from 1, as behind a first packet."""
+    """Number of bytes, by True for requests; they count from 1, as after a first packet."""
 
 
 class ModbusTcpForm:
-    """Frames as Modbus/TCP: device id, transactions, one connection a drive."""
+    """Frames as Modbus/TCP: device id, transactions, one connection per drive."""
 
     link_type = LINK_IPV4
 
@@ -81,7 +81,7 @@ class ModbusTcpForm:
         self._noise = b""
 
     def frame_packet(self, device: int, pdu: bytes, *, request: bool) -> Packet:
-        """The packet, with what lay before it and forms no frame in its comment."""
+        """Return the packet; its comment contains the bytes before it that form no frame."""
         connection = self._connections.setdefault(device, _Connection(device))
         if request:
             connection.transaction = (connection.transaction + 1) & 0xFFFF
@@ -91,13 +91,13 @@ class ModbusTcpForm:
         return Packet(_ip(connection, head + pdu, request=request), comment)
 
     def noise_packet(self, data: bytes) -> Packet | None:
-        """None: the next packet contains it."""
+        """Return None: the next packet contains the bytes in its comment."""
         self._noise += data
         return None
 
 
 def _ip(connection: _Connection, data: bytes, *, request: bool) -> bytes:
-    """The data with the headers of TCP and IPv4 before it."""
+    """Return the data with TCP and IPv4 headers."""
     drive = DRIVES + bytes([connection.device])
     ports = FIRST_CLIENT_PORT + connection.device, SERVER_PORT
     if request:
@@ -116,7 +116,7 @@ def _ip(connection: _Connection, data: bytes, *, request: bool) -> bytes:
 
 
 def _with_sum(head: bytes, at: int, before: bytes = b"", behind: bytes = b"") -> bytes:
-    """A header with its checksum at a place; the sum goes over what is around it, too."""
+    """Return a header with its checksum at a place; the sum includes the bytes around it."""
     data = before + head + behind
     data += bytes(len(data) % 2)
     words: tuple[int, ...] = struct.unpack(f">{len(data) // 2}H", data)

@@ -1,7 +1,7 @@
-"""Blocks of a pcapng file: the three that a program which reads frames needs. Pure functions.
+"""Blocks of a pcapng file: the three that a reader of frames needs. Pure functions.
 
-Written here because the libraries for it are not kept, or bring a library in C, or all of a
-network's protocols; what is needed of the format fits on a page.
+The available libraries are unmaintained, need a C library, or contain all network protocols. The
+required part of the format is small.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ BYTE_ORDER = 0x1A2B3C4D
 LINK_IPV4 = 228
 """Packets that begin with the header of IPv4."""
 LINK_USER_0 = 147
-"""Packets of a form known to the reader."""
+"""Packets of a format that the reader must know."""
 COMMENT, INTERFACE_NAME, PROGRAM, RESOLUTION = 1, 2, 4, 9
-"""Numbers of options; PROGRAM is one of a section, the next two of an interface."""
+"""Option numbers; PROGRAM belongs to a section, the next two to an interface."""
 NANOSECONDS = bytes([9])
 _UNKNOWN_LENGTH = 0xFFFF_FFFF_FFFF_FFFF
 _LONGEST_TEXT = 4096
@@ -37,7 +37,7 @@ def interface_block(link_type: int, name: str) -> bytes:
 
 
 def packet_block(data: bytes, wall: float, comment: str = "") -> bytes:
-    """One packet; `wall` is its time in seconds since 1970."""
+    """Return a packet; `wall` is its time in seconds since 1970."""
     high, low = divmod(round(wall * 1e6) * 1000, 1 << 32)
     head = struct.pack("<IIIII", 0, high, low, len(data), len(data))
     return _block(PACKET, head + _padded(data), [(COMMENT, _text(comment))] if comment else [])

@@ -1,1 +1,1 @@
-"""Traffic of others on a serial line: bytes into frames, frames into exchanges."""
+"""Traffic of other masters on a serial line: bytes into frames, frames into exchanges."""

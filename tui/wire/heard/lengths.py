@@ -1,7 +1,7 @@
-"""Length of a frame from its first bytes, once as a request and once as a reply. Pure functions.
+"""Length of a frame from its first bytes, as a request and as a reply. Pure functions.
 
-A listener does not know which of both it is, and a pause between frames is not a measure: an
-adapter hands over what it has collected.
+A listener does not know if a frame is a request or a reply. Pauses do not show it either, because
+an adapter delivers collected bytes.
 """
 
 from __future__ import annotations
@@ -9,25 +9,25 @@ from __future__ import annotations
 from ..frames import MAX_FRAME, MIN_FRAME, is_whole
 
 REFUSAL = 0x80
-"""Bit of the function in a reply that refuses."""
+"""Bit that a reply sets in the function code to refuse a request."""
 IDENTIFICATION, IDENTIFICATION_KIND = 43, 14
 _CHECKSUM = 2
 _REQUESTS = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 7: 4, 8: 8, 11: 4, 12: 4, 17: 4, 22: 10, 43: 7}
 _COUNTED_REQUESTS = {15: 6, 16: 6, 23: 10}
-"""By function, the place of the byte that counts the bytes after it."""
+"""By function, the offset of the byte that counts the bytes after it."""
 _REPLIES = {5: 8, 6: 8, 7: 5, 8: 8, 11: 8, 15: 8, 16: 8, 22: 10}
 _COUNTED_REPLIES = {1: 2, 2: 2, 3: 2, 4: 2, 12: 2, 17: 2, 23: 2}
 _OBJECTS_FROM = 8
-"""Offset of the objects of an identification; the byte before counts them."""
+"""Offset of the objects in an identification; the byte before is their number."""
 SAME_BOTH_WAYS = frozenset({5, 6, 8, 22})
-"""Functions whose reply repeats the request, or may do so."""
+"""Functions whose reply may be equal to the request."""
 
 Lengths = tuple[int, ...] | None
-"""Possible lengths of a frame, or None if more of it must come."""
+"""Possible lengths of a frame; None if more bytes are needed."""
 
 
 def request_lengths(head: bytes | bytearray) -> Lengths:
-    """Length of the request that begins like this; none if no request does."""
+    """Return the lengths of requests with this beginning; empty if there is none."""
     if len(head) < 2:
         return None
     function = head[1]
@@ -37,12 +37,12 @@ def request_lengths(head: bytes | bytearray) -> Lengths:
 
 
 def reply_lengths(head: bytes | bytearray) -> Lengths:
-    """Length of the reply that begins like this; none if no reply does."""
+    """Return the lengths of replies with this beginning; empty if there is none."""
     if len(head) < 2:
         return None
     function = head[1]
     if function & REFUSAL:
-        # a refused identification has its kind, or has it not
+        # a refused identification may or may not contain its kind
         return (5, 6) if function & ~REFUSAL == IDENTIFICATION else (5,)
     if function == IDENTIFICATION:
         return _identification(head)
@@ -56,7 +56,7 @@ def _counted(head: bytes | bytearray, place: int) -> Lengths:
 
 
 def _identification(head: bytes | bytearray) -> Lengths:
-    """By the lengths of its objects."""
+    """Return the length from the lengths of its objects."""
     if len(head) < _OBJECTS_FROM:
         return () if len(head) > 2 and head[2] != IDENTIFICATION_KIND else None
     at = _OBJECTS_FROM
@@ -70,17 +70,18 @@ def _identification(head: bytes | bytearray) -> Lengths:
 
 
 def whole_length(data: bytes | bytearray) -> int:
-    """Bytes of the whole frame that the data begins with, as its function has it; else 0."""
+    """Return the length of the whole frame at the beginning, by its function; 0 if there is
+    none."""
     found = {*(request_lengths(data) or ()), *(reply_lengths(data) or ())}
-    # a frame whose checksum ends with a zero may be whole without that, too
+    # if the checksum ends with a zero, the frame also seems whole without it
     return _whole(data, tuple(sorted(found, reverse=True)))
 
 
 def due_length(data: bytes | bytearray, *, reply: bool) -> int:
-    """The same where it is known whether a reply is due, or else a request.
+    """Return the same if it is known that a reply, or a request, is due.
 
-    A frame of the other kind is none as long as one that is due may still come of it: a frame that
-    ends with a zero is whole without that, too, and one may be the beginning of the other.
+    A frame of the other kind does not count while the due one is still possible. A frame that ends
+    with a zero also seems whole without it, and one kind may be the beginning of the other.
     """
     due, other = reply_lengths(data), request_lengths(data)
     if not reply:
@@ -96,25 +97,25 @@ def _whole(data: bytes | bytearray, lengths: Lengths) -> int:
 
 
 def may_grow(data: bytes | bytearray) -> bool:
-    """Return True if a frame that begins so may still be whole once more of it has come."""
+    """Return True if the data may become a whole frame with more bytes."""
     if len(data) >= MAX_FRAME:
         return False
     both = request_lengths(data), reply_lengths(data)
     if None in both or both == ((), ()):
-        return True  # a function that is not known here ends with a pause only
+        return True  # a frame of an unknown function ends only with a pause
     return any(length > len(data) for lengths in both for length in lengths or ())
 
 
 def fits_request(frame: bytes) -> bool:
-    """Return True if a whole frame is as long as a request of its function."""
+    """Return True if a whole frame has the length of a request of its function."""
     return _fits(request_lengths(frame), frame)
 
 
 def fits_reply(frame: bytes) -> bool:
-    """Return True if a whole frame is as long as a reply of its function."""
+    """Return True if a whole frame has the length of a reply of its function."""
     return _fits(reply_lengths(frame), frame)
 
 
 def _fits(lengths: Lengths, frame: bytes) -> bool:
-    # of a function that is not known here either may be
+    # a frame of an unknown function may be either
     return (lengths == () and not frame[1] & REFUSAL) or len(frame) in (lengths or ())

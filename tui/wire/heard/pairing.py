@@ -1,7 +1,7 @@
-"""Frames that were heard, matched: which reply belongs to which request. No clock, no port.
+"""Matching of observed replies to their requests. No clock, no port.
 
-On a serial line a request and its reply may be the same bytes, without a sign of the sender: here
-it follows from the last request, and its age.
+On a serial line, a request and its reply may be the same bytes, without a sender. The last request
+and its age show which one it is.
 """
 
 from __future__ import annotations
@@ -13,16 +13,16 @@ from .lengths import REFUSAL, SAME_BOTH_WAYS, fits_reply, fits_request
 from .splitting import HeardFrame
 
 HeardAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
-"""Result of a request: `again` is a second reply, `unasked` one to no request."""
+"""Result of a request: `again` is a second reply, `unasked` a reply without a request."""
 BROADCAST_DEVICE = 0
 GIVEN_UP_AFTER = 3.0
 """Seconds after which a request counts as unanswered, even if no other follows."""
 REPLY_WITHIN = 0.15
-"""Seconds in which a reply that may as well be its request once more counts as a reply."""
+"""Seconds in which a frame that may be the reply or the repeated request counts as the reply."""
 AGAIN_WITHIN = 0.05
 """Seconds in which a repeat of an unanswered write is a second reply."""
 _ECHOED = {15: 5, 16: 5}
-"""Bytes that the reply of a function has from its request, function included."""
+"""Number of bytes that a reply repeats from its request, by function; includes the function."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +30,8 @@ class HeardExchange:
     """A request with its result; requests and replies without device and checksum."""
 
     time: float
-    """When the request began, of the listener's clock; of an unasked reply when that began."""
+    """Time of the start of the request, or of a reply without a request, by the listener's
+    clock."""
     device: int
     function: int
     answer: HeardAnswer
@@ -41,11 +42,11 @@ class HeardExchange:
     noise: bytes = b""
     """Bytes after the request that form no frame."""
     waited: float | None = None
-    """Seconds from the end of a request that was not answered to the next request."""
+    """Seconds from the end of an unanswered request to the next request."""
 
     @property
     def exception(self) -> int | None:
-        """The code with which the device refuses."""
+        """Exception code of the reply; None if it is not an exception."""
         return self.reply[-1] if self.answer == "exception" else None
 
 
@@ -56,13 +57,13 @@ class _OpenRequest:
 
 
 class Pairing:
-    """Takes frames in their order, gives exchanges as soon as the result of each is known."""
+    """Converts frames, in their order, to exchanges; each is returned when its result is known."""
 
     def __init__(self) -> None:
         self._requested: _OpenRequest | None = None
         self._last: HeardExchange | None = None
         self._replied = float("-inf")
-        """When the last reply ended."""
+        """Time of the end of the last reply."""
         self._reply = b""
         """The last reply as it was on the line."""
 
@@ -75,7 +76,10 @@ class Pairing:
         )
 
     def take(self, frame: HeardFrame) -> tuple[list[HeardExchange], bool | None]:
-        """A frame; what is known by it, and whether it is a request (None of noise)."""
+        """Take a frame; return the exchanges that are now known, and True if it is a request.
+
+        The second value is None for noise.
+        """
         if not frame.whole:
             if self._requested is not None:
                 self._requested.noise += frame.data
@@ -84,7 +88,7 @@ class Pairing:
         if requested is not None and _answers(requested.frame, frame):
             return [self._answered(requested, frame)], False
         if not fits_request(frame.data):
-            return [self._stray(frame)], False  # the reply that is due may still come
+            return [self._stray(frame)], False  # the due reply may still arrive
         found = self._given_up(frame)
         if frame.device == BROADCAST_DEVICE:
             return [*found, self._kept(_exchange(frame, "broadcast"))], True
@@ -92,7 +96,7 @@ class Pairing:
         return found, True
 
     def wait(self, now: float, longest: float = GIVEN_UP_AFTER) -> list[HeardExchange]:
-        """The time is `now`, and nothing has come: the request that waits for `longest` seconds."""
+        """Return the open request as unanswered if it has waited for `longest` seconds."""
         if self._requested is None or now - self._requested.frame.ended < longest:
             return []
         return self._given_up()
@@ -115,12 +119,12 @@ class Pairing:
         )
 
     def _given_up(self, following: HeardFrame | None = None) -> list[HeardExchange]:
-        """The request that is open, without an answer; `following` is the next request."""
+        """Return the open request as unanswered; `following` is the next request."""
         requested, self._requested = self._requested, None
         if requested is None:
             return []
         frame = requested.frame
-        # a second drive at the same address says the same a moment later
+        # a second drive at the same address answers a moment later
         if frame.data == self._reply and frame.begun - self._replied < AGAIN_WITHIN:
             return [self._again(frame)]
         answer: HeardAnswer = "damaged" if requested.noise else "none"
@@ -128,7 +132,7 @@ class Pairing:
         return [self._kept(_exchange(frame, answer, requested.noise, waited))]
 
     def _stray(self, frame: HeardFrame) -> HeardExchange:
-        """A reply without a request."""
+        """Return a reply without a request."""
         last = self._last
         same = last is not None and last.answer in ("ok", "exception", "again")
         function = frame.function & ~REFUSAL
@@ -151,14 +155,14 @@ class Pairing:
 def _exchange(
     frame: HeardFrame, answer: HeardAnswer, noise: bytes = b"", waited: float | None = None
 ) -> HeardExchange:
-    """An exchange without a reply."""
+    """Return an exchange without a reply."""
     return HeardExchange(
         frame.begun, frame.device, frame.function, answer, frame.pdu, noise=noise, waited=waited
     )
 
 
 def _answers(requested: HeardFrame, frame: HeardFrame) -> bool:
-    """Return True if a frame is the reply to a request, refusals too."""
+    """Return True if a frame is the reply to a request, including exceptions."""
     if frame.device != requested.device or frame.function & ~REFUSAL != requested.function:
         return False
     if frame.function & REFUSAL:
@@ -176,5 +180,5 @@ def _answers(requested: HeardFrame, frame: HeardFrame) -> bool:
 
 
 def _repeated(requested: HeardFrame, frame: HeardFrame) -> bool:
-    """Return True if a master that got no answer has sent the same once more."""
+    """Return True if a master has repeated an unanswered request."""
     return frame.data == requested.data and frame.begun - requested.ended > REPLY_WITHIN

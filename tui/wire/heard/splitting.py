@@ -1,7 +1,7 @@
-"""Bytes that were heard on a line, taken apart into frames of whatever master. No clock, no port.
+"""Frames of any master, found in the bytes that were received on a line. No clock, no port.
 
-Frames are found by the length that their function has, and their checksum. Where that leads
-nowhere (noise, a cut frame, a function that is not known here), the next frame is looked for.
+A frame is found by the length for its function, and by its checksum. After noise, a cut frame or an
+unknown function, the next frame is searched for.
 """
 
 from __future__ import annotations
@@ -13,23 +13,23 @@ from ..frames import MAX_FRAME, MIN_FRAME, is_whole
 from .lengths import REFUSAL, due_length, may_grow, whole_length
 
 LONGEST_HEAP = 4 * MAX_FRAME
-"""Bytes without a frame that are kept at most, waiting for a pause."""
+"""Most bytes without a frame that are kept until a pause."""
 SILENT_BEFORE = 0.001
-"""Seconds of silence before a reading with which a frame may begin, whatever lies before it."""
+"""Seconds of silence before a reading, after which a frame may begin in any case."""
 
 
 @dataclass(frozen=True, slots=True)
 class HeardFrame:
-    """A frame, or bytes that form none; times are those of the listener's clock, in seconds."""
+    """A frame, or bytes outside any frame; times are those of the listener's clock, in seconds."""
 
     begun: float
     ended: float
     data: bytes
     whole: bool
     pause: float | None = None
-    """Silence before it; None where it came in one reading with what was before."""
+    """Silence before it; None if it was received in one reading with the bytes before."""
     gap: float = 0.0
-    """The longest silence between two of its bytes, as far as readings show."""
+    """The longest silence between two of its bytes, as far as readings show it."""
 
     @property
     def device(self) -> int:
@@ -49,18 +49,18 @@ class HeardFrame:
 
 @dataclass(slots=True)
 class _Chunk:
-    """Bytes of one reading that are left; when the first began and the last ended."""
+    """The remaining bytes of one reading, with the times of their start and end."""
 
     length: int
     begun: float
     ended: float
     apart: bool = False
-    """True if it was silent before it."""
+    """True after silence."""
     fresh: bool = True
-    """True if none of it was given yet."""
+    """True if none of its bytes was removed yet."""
 
     def give(self, count: int) -> float:
-        """Take bytes from its beginning; when the last of them ended."""
+        """Remove bytes from its beginning; return the time when the last of them ended."""
         each = (self.ended - self.begun) / self.length
         self.length -= count
         self.begun = self.ended if not self.length else self.begun + count * each
@@ -69,10 +69,10 @@ class _Chunk:
 
 
 class FrameSplitter:
-    """Takes readings of a line, gives frames; `character` is what a byte takes, in seconds.
+    """Splits readings of a line into frames; `character` is the time of a byte in seconds.
 
-    With a `character` of 0 all bytes of a reading count as of one moment. `reply_due` says for a
-    device and a function whether a reply is due, by the frames until then.
+    With a `character` of 0, all bytes of a reading count as simultaneous. `reply_due` returns True
+    if a reply of a device to a function is due, according to the frames so far.
     """
 
     def __init__(
@@ -83,21 +83,21 @@ class FrameSplitter:
         self._data = bytearray()
         self._chunks: list[_Chunk] = []
         self._dead = 0
-        """Bytes at the beginning with none of which a frame can begin."""
+        """Number of bytes at the beginning at which no frame can begin."""
         self._complete = False
-        """True if the last byte that was read is known to end a frame."""
+        """True if the last byte is known to end a frame."""
         self._ended = float("-inf")
-        """When the last byte that was read had ended."""
+        """Time of the end of the last byte."""
         self._given: float | None = None
-        """When the last frame that was given had ended."""
+        """Time of the end of the last frame that was returned."""
 
     @property
     def waiting(self) -> bool:
-        """True if there are bytes that form no frame yet."""
+        """True if there are bytes that do not form a frame yet."""
         return bool(self._data)
 
     def take(self, data: bytes, time: float) -> Iterator[HeardFrame]:
-        """Bytes that were read at a time; the frames that are whole by now, each to be taken."""
+        """Take bytes that were read at a time; yield the frames that are now complete."""
         self._complete = False
         if data:
             self._data += data
@@ -108,7 +108,7 @@ class FrameSplitter:
         yield from self._frames(final=False)
 
     def pause(self) -> Iterator[HeardFrame]:
-        """The line has been silent for long: no frame goes on, so all that is left is given."""
+        """Yield all remaining bytes after a long silence: no frame continues."""
         return self._frames(final=True)
 
     def _frames(self, *, final: bool) -> Iterator[HeardFrame]:
@@ -128,14 +128,14 @@ class FrameSplitter:
                 break
             self._dead += 1
         if self._frame_of_its_own():
-            # it proves that nothing before it goes on, nor it itself; that may be whole frames
+            # nothing before it continues, nor does it; so there may be whole frames
             self._complete = True
             length = whole_length(self._data)
             return bool(length), length or self._frame_behind()
         return False, self._dead if self._dead > LONGEST_HEAP else 0
 
     def _length(self, data: bytearray) -> int:
-        """Bytes of the frame at the beginning; 0 where it is none yet."""
+        """Return the length of the frame at the beginning; 0 if it is not complete yet."""
         if len(data) < MIN_FRAME:
             return 0
         if self._complete:
@@ -144,12 +144,12 @@ class FrameSplitter:
         return due_length(data, reply=self._reply_due(device, function))
 
     def _last(self) -> tuple[bool, int]:
-        """The same where nothing more comes."""
+        """Return the same if no more bytes follow."""
         if length := whole_length(self._data):
             return True, length
         if start := self._frame_behind():
             return False, start
-        # a function that is not known here: between two pauses, with a right checksum
+        # an unknown function: between two pauses, with a correct checksum
         whole = MIN_FRAME <= len(self._data) <= MAX_FRAME and is_whole(self._data)
         return whole and self._chunks[0].fresh, len(self._data)
 
@@ -159,8 +159,8 @@ class FrameSplitter:
         return next((at for at in starts if whole_length(self._data[at:])), 0)
 
     def _frame_of_its_own(self) -> bool:
-        """Return True if a frame lies between a silence and the last byte: it belongs to no
-        other."""
+        """Return True if a frame begins after silence and ends with the last byte, so that it is
+        separate."""
         at = 0
         for chunk in self._chunks:
             if chunk.apart and at and whole_length(self._data[at:]) == len(self._data) - at:
@@ -169,7 +169,7 @@ class FrameSplitter:
         return False
 
     def _cut(self, length: int, *, whole: bool) -> HeardFrame:
-        """Give so many bytes from the beginning."""
+        """Remove this number of bytes from the beginning, and return them as a frame."""
         data = bytes(self._data[:length])
         del self._data[:length]
         self._dead = max(0, self._dead - length)
