@@ -9,13 +9,20 @@ from pathlib import Path
 import pytest
 
 from tests.limits import WAS_OFF
+from tests.session.fake_clock import FakeClock
+from tui.bus.fake import FakeLine
 from tui.bus.line import Timing
 from tui.drive.errors import ValueRefused
+from tui.drive.profile import library
 from tui.drive.settings.parameter_set import dump_set
 from tui.drive.settings.selection import FILTERS, rows
 from tui.drive.settings.set_file import read_set, write_file
+from tui.session.drive import DriveSession
 from tui.session.read.upload import Upload
+from tui.session.reading import reading_of
 from tui.session.settings.editor import Editor
+from tui.session.settings.watched_values import WatchedValues
+from tui.session.shown import Quality
 
 from .test_command import FAMILIES, Bench, bench
 
@@ -146,9 +153,10 @@ async def test_ramp_keeps_its_seconds_if_its_increment_changes() -> None:
         editor.apply()
         await written(made, editor)
         assert (made.drive.raw("INR"), made.drive.raw("ACC")) == (0, 750)
-        value = editor.values.value("ACC")
-        assert value is not None
-        assert value.display == "7.50 s"
+        assert editor.values.value_of("ACC", 750).display == "7.50 s"
+        held = editor.values.held("ACC")
+        assert held is not None
+        assert reading_of(held).value == editor.values.value_of("ACC", 750)
 
 
 async def test_unverified_parameter_is_confirmed_once() -> None:
@@ -307,3 +315,34 @@ async def test_family_that_saves_each_write_has_nothing_unsaved() -> None:
     async with editing("atv21") as (made, editor):
         await write(made, editor, "ACC", "7.5 s")
         assert editor.unsaved == set()
+
+
+@pytest.mark.parametrize(
+    ("after", "trouble", "quality"),
+    [
+        (8.0, "", Quality.GOOD),
+        (12.0, "", Quality.STALE),
+        (0.5, "No answer from device 1.", Quality.STALE),
+    ],
+    ids=["current", "not read again", "cannot be read"],
+)
+def test_held_value_is_old_if_it_is_not_read_again(
+    after: float, trouble: str, quality: Quality
+) -> None:
+    clock = FakeClock()
+    session = DriveSession(FakeLine({1: {}}), 1, library.load("atv71"), clock=clock)
+    values = WatchedValues(session, lambda: None, lambda: None)
+    assert values.held("HSP") is None
+    session.image.confirm("HSP", 500, clock.monotonic())
+    clock.advance(after)
+    values.trouble = trouble
+    held = values.held("HSP")
+    assert held is not None
+    assert held.quality is quality
+    drawn = held.drawn(
+        clock.monotonic(),
+        current=lambda value: value.display,
+        old=lambda value, age: f"{value.display}, {age:.1f}",
+        missing="",
+    )
+    assert drawn == ("50.0 Hz" if quality is Quality.GOOD else f"50.0 Hz, {after:.1f}")

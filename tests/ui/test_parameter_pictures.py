@@ -66,6 +66,7 @@ def editor_of(
     profile = library.load("atv71")
     snapshot = fakes.snapshot_of(profile, state)
     console = fakes.console_of(snapshot, armed=armed)
+    console.session.clock = fakes.StillClock()
     editor = still_editor(console, lambda: snapshot.state)
     editor.marks = Marks(favorites=("ACC", "HSP"))
     rest = {} if reading else {p.code: 0 for p in profile.parameters if p.access != "w"}

@@ -16,13 +16,15 @@ from rich.text import Text
 
 from tui.screens.monitor.view import View
 from tui.session.console import DriveConsole
+from tui.session.settings.editor import Editor
 from tui.session.shown import Shown
 
 
-def drawn(view: View, console: DriveConsole, values: dict[str, Shown]) -> Text:
+def drawn(view: View, console: DriveConsole, editor: Editor, values: dict[str, Shown]) -> Text:
     value = view.reading("RFR") or values["RFR"]
     latest = console.monitor.latest
-    assert latest is not None
+    held = editor.values.held("ACC")
+    assert latest is not None and held is not None
     return Text({expression})
 
 
@@ -34,6 +36,10 @@ WITH_AGE = (
     'missing="")'
 )
 BARE = (
+    "held.text",
+    "held.value.text",
+    "editor.values.held('ACC').text",
+    "held.drawn(view.now, current=lambda value: value.text, missing='')",
     "value.text",
     "value.value.text",
     "str(value.number)",

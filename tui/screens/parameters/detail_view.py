@@ -11,11 +11,12 @@ from tui.drive.taught_profile import why_not_taught
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import wrapped
-from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE, STRONG
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE, STRONG, age_text
 
 from .value_text import (
     CONFIDENCE_WORDS,
     factory_text,
+    held_drawn,
     is_changed,
     limits_now,
     old_text,
@@ -66,11 +67,17 @@ def _help(editor: Editor, parameter: Parameter, width: int, room: int, step: str
 
 
 def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
-    raw = editor.values.raws.get(parameter.code)
-    found: list[str] = []
-    if parameter.bits and raw is not None:
-        names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, raw))
-        found.append(f"Now: {names or 'no bit set'}")
+    held, found = editor.values.held(parameter.code), list[str]()
+    if parameter.bits and held is not None and held.raw is not None:
+        names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, held.raw))
+        when = held_drawn(
+            editor,
+            parameter.code,
+            current=lambda _: "Now",
+            old=lambda _, age: f"{age_text(age)} ago",
+            missing="",
+        )
+        found.append(f"{when}: {names or 'no bit set'}")
     # a profile's note on a word without a scale says that it is shown raw
     if parameter.note and parameter.code not in editor.session.profile.taught:
         found.append(parameter.note)

@@ -52,7 +52,7 @@ class EditNumber(Question[str | None]):
         editor, parameter = self._editor, self._parameter
         staged = editor.staging.edits.get(parameter.code)
         raw = staged.new if staged else editor.values.raws.get(parameter.code)
-        value = editor.values.value(parameter.code, raw) if raw is not None else None
+        value = editor.values.value_of(parameter.code, raw) if raw is not None else None
         with Vertical(id="dialog"):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
             yield from self.now_lines()

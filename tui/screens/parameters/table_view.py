@@ -11,11 +11,12 @@ from rich.text import Text
 
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Parameter
+from tui.drive.values import NOT_AVAILABLE
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import fitted_names, short
-from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, LINE, PLAIN, STRONG, TITLE
+from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, LINE, PLAIN, STALE, STRONG, TITLE
 
-from .value_text import is_changed, old_text, other_text, range_text, value_text
+from .value_text import held_drawn, is_changed, old_text, other_text, range_text
 
 NAME_CELLS, NAME_ROOM = 46, 30
 """Cells of a name at most if no name is longer, and those that it needs before limits are shown."""
@@ -184,8 +185,14 @@ def _row(editor: Editor, parameter: Parameter, layout: TableLayout) -> Text:
     name = layout.names[parameter.name]
     text.append(f"{name:<{columns.name}}", PLAIN if parameter.access != "r" else FAINT)
     changed = is_changed(editor, parameter)
-    held = short(value_text(editor, code), columns.value)
-    text.append(f"{held:>{columns.value}}", _value_style(editor, parameter, changed))
+    held, style = held_drawn(
+        editor,
+        code,
+        current=lambda value: (value, STRONG if changed else PLAIN),
+        old=lambda value, _: (value, STALE),
+        missing=(NOT_AVAILABLE, FAINT),
+    )
+    text.append(f"{short(held, columns.value):>{columns.value}}", style)
     if columns.staged:
         text.append_text(_staged(editor, code, columns.staged))
     if columns.other:
@@ -206,12 +213,6 @@ def _code_style(parameter: Parameter, sure: bool) -> Style:
     if not sure:
         return ALARM
     return FAINT if parameter.access == "r" else STRONG
-
-
-def _value_style(editor: Editor, parameter: Parameter, changed: bool) -> Style:
-    if parameter.code not in editor.values.raws:
-        return FAINT
-    return STRONG if changed else PLAIN
 
 
 def _staged(editor: Editor, code: str, width: int) -> Text:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from tui.drive.profile.schema import Confidence, Parameter
 from tui.drive.settings.factory import factory_is_sure, factory_value, not_factory
 from tui.drive.settings.in_force import LimitsInForce, limits_in_force
-from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.settings.editor import Editor
+from tui.session.shown import Drawn
+from tui.widgets.palette import age_text
 
 CONFIDENCE_WORDS: dict[Confidence, str] = {
     "manual": "manual",
@@ -20,10 +23,35 @@ CONFIDENCE_WORDS: dict[Confidence, str] = {
 """Source of the knowledge about a parameter."""
 
 
+def held_drawn(
+    editor: Editor,
+    code: str,
+    *,
+    current: Callable[[str], Drawn],
+    old: Callable[[str, float], Drawn],
+    missing: Drawn,
+) -> Drawn:
+    """Draw the text of the held value: one that is current, or old with its age in seconds."""
+    held = editor.values.held(code)
+    if held is None:
+        return missing
+    return held.drawn(
+        editor.session.clock.monotonic(),
+        current=lambda value: current(value.display),
+        old=lambda value, age: old(value.display, age),
+        missing=missing,
+    )
+
+
 def value_text(editor: Editor, code: str) -> str:
-    """The held value, dashes while there is none."""
-    value = editor.values.value(code)
-    return value.display if value is not None else NOT_AVAILABLE
+    """The held value, with its age if it is old; dashes if there is none."""
+    return held_drawn(
+        editor,
+        code,
+        current=lambda text: text,
+        old=lambda text, age: f"{text}, {age_text(age)} old",
+        missing=NOT_AVAILABLE,
+    )
 
 
 def other_text(editor: Editor, parameter: Parameter) -> str:
@@ -51,9 +79,7 @@ def is_changed(editor: Editor, parameter: Parameter) -> bool:
 
 def text_of(editor: Editor, parameter: Parameter, raw: int) -> str:
     """A raw value of a parameter with its unit."""
-    return shown(
-        editor.session.profile, parameter, raw, editor.values.raws, editor.values.lacking
-    ).display
+    return editor.values.value_of(parameter.code, raw).display
 
 
 def old_text(editor: Editor, code: str) -> str:

@@ -15,11 +15,12 @@ from tui.drive.profile.schema import Parameter, StateKind
 from tui.drive.settings.factory import factory_sources
 from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
-from tui.safety import WAS_OFF
+from tui.safety import LOOK_IS_OLD, WAS_OFF
 
 from ..drive import DriveSession
 from ..read.retrying_reader import RetryingReader, neighbors
 from ..read.upload import readable_codes
+from ..shown import Shown
 
 IDLE_POLL_INTERVAL = 0.1
 """Seconds between two checks of a reader that has nothing to do."""
@@ -69,14 +70,21 @@ class WatchedValues:
         codes = readable_codes(self.session.profile)
         return sum(code in self.raws or code in self.absent for code in codes), len(codes)
 
-    def value(self, code: str, raw: int | None = None) -> Value | None:
-        """Return a value with its unit or name: the held one, or that of another raw value."""
-        held = self.raws.get(code) if raw is None else raw
-        if held is None:
+    def held(self, code: str) -> Shown | None:
+        """Return the value that the drive holds; stale if it was not read again in time.
+
+        None if it was never read, or has been written since.
+        """
+        reading = self.session.image.get(code)
+        if reading is None or reading.raw is None:
             return None
-        return shown(
-            self.session.profile, self.session.profile[code], held, self.raws, self.lacking
-        )
+        longest = 0.0 if self.trouble else LOOK_IS_OLD
+        found = reading.decoded(self.value_of(code, reading.raw), None)
+        return found.aged(self.session.clock.monotonic(), longest)
+
+    def value_of(self, code: str, raw: int) -> Value:
+        """Return the value of a raw value that is not read, but proposed or compared with."""
+        return shown(self.session.profile, self.session.profile[code], raw, self.raws, self.lacking)
 
     def start(self) -> None:
         """Begin to read, and read all values again."""
