@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import asyncio
 import itertools
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict
 from types import SimpleNamespace
@@ -40,7 +41,7 @@ from tui.bus.stop_counts import StopCounts
 from tui.drive.orders import chart_codes
 from tui.drive.profile import library
 from tui.screens.frame_source import _seen
-from tui.session.command import motor_stop
+from tui.session.command import motor_stop, under_way
 from tui.session.command.access import CommandAccess
 from tui.session.command.last_known import is_likely_to_run
 from tui.session.command.stop import Stopper
@@ -74,6 +75,13 @@ class Now:
     async def sleep(self, seconds: float) -> None:
         self.seconds += seconds
         await asyncio.sleep(0)
+
+
+class ThreadTime(Now):
+    """The same for the module `time` of a thread, in which to sleep moves it."""
+
+    def sleep(self, seconds: float) -> None:  # type: ignore[override]
+        self.seconds += seconds
 
 
 def names() -> list[str]:
@@ -431,6 +439,35 @@ def test_stop_after_an_internal_error_waits_0_3_seconds_for_the_exchange_in_flig
     way = SimpleNamespace(_waiting=[], master="open", _send_now=None, _wake=lambda: None)
     LastWay.put(cast(Any, way), [], lambda _: None)
     assert 0.2 < waited[0] < 0.4
+
+
+class AtOnce:
+    """A thread whose work is done when it starts."""
+
+    def __init__(self, target: Callable[[], None], **_: object) -> None:
+        self.start = target
+
+
+def test_stop_around_a_loop_that_hangs_is_repeated_each_second(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now, times = ThreadTime(), list[float]()
+    monkeypatch.setattr(under_way, "time", now)
+    monkeypatch.setattr(under_way, "threading", SimpleNamespace(Thread=AtOnce))
+    stop = SimpleNamespace(sent=False, over=False, begun=False)
+
+    def refused(_: tuple[int, ...]) -> None:
+        times.append(now.seconds)
+        stop.over = len(times) == 4
+        raise OSError("it does not answer")
+
+    line = SimpleNamespace(facts=SimpleNamespace(voice=SimpleNamespace(stop_directly=refused)))
+    stop.session = SimpleNamespace(line=line, device=1)
+    work = SimpleNamespace(stop=stop, is_lost=lambda *_: now.seconds > 1100.0)
+    last: list[object] = []
+    under_way.watch_first_frames([cast(Any, work)], Timing(), lambda *what: last.append(what))
+    assert last == []
+    assert [0.9 < after - before < 1.2 for before, after in itertools.pairwise(times)] == [True] * 3
 
 
 # Clients of Modbus TCP
