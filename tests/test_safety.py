@@ -12,17 +12,19 @@ from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
+from textual.events import Key
 
 from tests.session.fake_clock import FakeClock
 from tui import safety
 from tui.bus.errors import LineLost, NoAnswer
 from tui.bus.fake import FakeLine
+from tui.bus.gateway.server import Awake
 from tui.bus.leases import WriteLeases
 from tui.bus.limits import CAUTIOUS
 from tui.bus.line import timing_of
 from tui.bus.line_events import EventHub
 from tui.bus.link import SerialLink
-from tui.bus.model import Priority, Timing
+from tui.bus.model import LineStatus, Priority, Timing
 from tui.bus.poll_plan import PlannedRead
 from tui.bus.program import KEEPER, Program
 from tui.bus.requests import Read, WriteOne
@@ -30,7 +32,7 @@ from tui.bus.schedule.last_way import LastWay
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job, SentStops
 from tui.bus.schedule.unsent import fail_lost
-from tui.bus.share import heartbeat
+from tui.bus.share import heartbeat, keeper_share
 from tui.bus.share.attached import Client
 from tui.bus.share.heartbeat import HeartbeatSender, programs_back
 from tui.bus.share.messages import VERSION, Asking
@@ -40,7 +42,9 @@ from tui.bus.share.polls import PollsServed
 from tui.bus.stop_counts import StopCounts
 from tui.drive.orders import chart_codes
 from tui.drive.profile import library
+from tui.screens.dialogs.question import Question
 from tui.screens.frame_source import _seen
+from tui.screens.monitor.run_line import RunLine
 from tui.session.command import motor_stop, under_way
 from tui.session.command.access import CommandAccess
 from tui.session.command.last_known import is_likely_to_run
@@ -53,7 +57,12 @@ from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.reader import Reader
 from tui.session.read.slots import Slots
+from tui.session.sharing.handover import Handover
 from tui.session.starts.starts import Starts
+from tui.terminal import type_ahead
+from tui.terminal.bursts import Bursts
+from tui.terminal.stroke import Stroke, attach
+from tui.terminal.tokens import KeyToken
 
 from .sources import PACKAGE, tree_of
 
@@ -468,6 +477,175 @@ def test_stop_around_a_loop_that_hangs_is_repeated_each_second(
     under_way.watch_first_frames([cast(Any, work)], Timing(), lambda *what: last.append(what))
     assert last == []
     assert [0.9 < after - before < 1.2 for before, after in itertools.pairwise(times)] == [True] * 3
+
+
+# Programs that hang, by the clock of a test
+
+
+class Hanging:
+    """The process of a keeper that hangs."""
+
+    remedy = ""
+
+    def __init__(self) -> None:
+        self.kills = 0
+
+    def kill(self) -> bool:
+        self.kills += 1
+        return True
+
+
+def watched_for(seconds: float, *, attached: bool = True, stops: bool = False) -> OwnerWatch:
+    """A look each tenth of a second at an owner that sends nothing."""
+    now = Now()
+    watch = owner_watch(now)
+    watch._process = cast(Any, Hanging())
+    if stops:
+        watch.note_stop()
+    for _ in range(round(seconds * 10)):
+        now.seconds += 0.1
+        watch.look(attached=attached)
+    return watch
+
+
+@pytest.mark.parametrize(("seconds", "frozen"), [(0.9, False), (1.2, True)])
+def test_owner_without_a_heartbeat_counts_as_frozen_after_a_second(
+    seconds: float, frozen: bool
+) -> None:
+    assert watched_for(seconds).frozen is frozen
+
+
+@pytest.mark.parametrize(("seconds", "kills"), [(2.8, 0), (3.2, 1)])
+def test_keeper_that_sends_nothing_is_replaced_after_three_seconds(
+    seconds: float, kills: int
+) -> None:
+    assert cast(Any, watched_for(seconds)._process).kills == kills
+
+
+@pytest.mark.parametrize(
+    ("attached", "seconds", "kills"),
+    [(True, 0.8, 0), (True, 1.2, 1), (False, 1.8, 0), (False, 2.2, 1)],
+)
+def test_keeper_has_a_second_for_a_greeting_and_a_second_for_a_stop(
+    attached: bool, seconds: float, kills: int
+) -> None:
+    watch = watched_for(seconds, attached=attached, stops=True)
+    assert cast(Any, watch._process).kills == kills
+
+
+@pytest.mark.parametrize(("after", "woke"), [(1.8, False), (2.2, True)])
+def test_gateway_was_suspended_after_two_seconds_without_a_turn(after: float, woke: bool) -> None:
+    now = Now()
+    awake = Awake(now)
+    now.seconds += after
+    assert awake.just_woke is woke
+    awake.look()
+    assert awake.just_woke is woke
+
+
+class Once(Exception):
+    """Ends work after its first turn."""
+
+
+async def test_alarm_ends_a_keeper_after_two_seconds_without_a_turn(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    alarms: list[float] = []
+
+    async def sleep(_: float) -> None:
+        raise Once
+
+    monkeypatch.setattr(keeper_share, "asyncio", SimpleNamespace(sleep=sleep))
+    share = SimpleNamespace(_keeping=SimpleNamespace(alarm=alarms.append))
+    with pytest.raises(Once):
+        await keeper_share.KeeperShare._renew_alarm(cast(Any, share))
+    assert 1.5 < alarms[0] < 2.5
+
+
+def test_keeper_waits_ten_seconds_for_the_next_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits: list[float] = []
+    loop = SimpleNamespace(call_later=lambda seconds, _: waits.append(seconds))
+    monkeypatch.setattr(asyncio, "get_running_loop", lambda: loop)
+    share = SimpleNamespace(
+        _moved=asyncio.Event(), _ending=None, _here=(), _needed=True, _end_unneeded=None,
+        _inside=SimpleNamespace(state=lambda: SimpleNamespace(status=LineStatus.CONNECTED)),
+    )  # fmt: skip
+    keeper_share.KeeperShare.moved(cast(Any, share), arrived=False)
+    share._ending = None
+    keeper_share.KeeperShare._end_unneeded(cast(Any, share))
+    assert [8 < seconds < 12 for seconds in waits] == [True, True]
+
+
+# Keys
+
+
+@pytest.mark.parametrize(("after", "early"), [(0.9, True), (1.1, False)])
+def test_question_that_appears_on_its_own_accepts_an_answer_after_a_second(
+    after: float, early: bool
+) -> None:
+    clock = SimpleNamespace(monotonic=lambda: after)
+    question = SimpleNamespace(
+        _drawn=0.0, _typed_at=-9.0, by_itself=True, app=SimpleNamespace(clock=clock)
+    )
+    assert Question._is_early(cast(Any, question)) is early
+
+
+@pytest.mark.parametrize(("after", "counts"), [(0.25, False), (0.35, True)])
+def test_enter_counts_after_the_run_line_was_shown_for_0_3_seconds(
+    after: float, counts: bool
+) -> None:
+    assert RunLine.counts(cast(Any, SimpleNamespace(opened=0.0)), after) is counts
+
+
+@pytest.mark.parametrize(("after", "alone"), [(0.04, False), (0.06, True)])
+def test_key_is_alone_if_no_other_follows_within_50_milliseconds(after: float, alone: bool) -> None:
+    bursts = Bursts()
+    bursts.key(KeyToken("r", "r", 1.0, 1.0))
+    assert bool(bursts.given(1.0 + after)) is alone
+
+
+@pytest.mark.parametrize(("after", "acts"), [(2.8, True), (3.2, False)])
+def test_key_acts_within_three_seconds(
+    after: float, acts: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = Now()
+    monkeypatch.setattr(type_ahead, "time", now)
+    event = Key("r", "r")
+    attach(event, Stroke(now.seconds, 0, alone=True))
+    now.seconds += after
+    keys = SimpleNamespace(
+        _stamps=SimpleNamespace(stop_stamp=int), _harmless=lambda _: False, _count=lambda _: None
+    )
+    assert type_ahead.TypeAhead._admits(cast(Any, keys), event) is acts
+
+
+# A drive that another program requests
+
+
+@pytest.mark.parametrize(("after", "given"), [(1.8, True), (2.2, False)])
+def test_drive_is_given_without_an_answer_if_it_stood_still_two_seconds_ago(
+    after: float, given: bool
+) -> None:
+    session, clock = session_showing(READY)
+    clock.advance(after)
+    replies: list[bool] = []
+    handover = SimpleNamespace(
+        _session_of=lambda _: session, _reply=lambda *_, yes: replies.append(yes)
+    )
+    Handover._decide(cast(Any, handover), 1, cast(Any, None))
+    assert replies == [given]
+
+
+async def test_request_for_a_drive_is_decided_after_15_seconds() -> None:
+    waits: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        waits.append(seconds)
+
+    clock = SimpleNamespace(sleep=sleep, monotonic=float)
+    handover = SimpleNamespace(_clock=clock, requests={})
+    await Handover._expire(cast(Any, handover), cast(Any, SimpleNamespace(device=1)))
+    assert 13 < waits[0] < 17
 
 
 # Clients of Modbus TCP
