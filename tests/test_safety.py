@@ -32,7 +32,7 @@ from tui.bus.schedule.last_way import LastWay
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job, SentStops
 from tui.bus.schedule.unsent import fail_lost
-from tui.bus.share import heartbeat, keeper_share
+from tui.bus.share import heartbeat, keeper_share, sharing
 from tui.bus.share.attached import Client
 from tui.bus.share.heartbeat import HeartbeatSender, programs_back
 from tui.bus.share.messages import VERSION, Asking
@@ -58,6 +58,7 @@ from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.reader import Reader
 from tui.session.read.slots import Slots
 from tui.session.sharing.handover import Handover
+from tui.session.sharing.orphan_motors import OrphanMotorGuard
 from tui.session.starts.starts import Starts
 from tui.terminal import type_ahead
 from tui.terminal.bursts import Bursts
@@ -457,7 +458,7 @@ class AtOnce:
         self.start = target
 
 
-def test_stop_around_a_loop_that_hangs_is_repeated_each_second(
+def test_stop_around_a_loop_that_hangs_begins_in_0_25_s_and_is_repeated_each_second(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now, times = ThreadTime(), list[float]()
@@ -476,6 +477,7 @@ def test_stop_around_a_loop_that_hangs_is_repeated_each_second(
     last: list[object] = []
     under_way.watch_first_frames([cast(Any, work)], Timing(), lambda *what: last.append(what))
     assert last == []
+    assert 0.2 < times[0] - 1000.0 < 0.4
     assert [0.9 < after - before < 1.2 for before, after in itertools.pairwise(times)] == [True] * 3
 
 
@@ -646,6 +648,61 @@ async def test_request_for_a_drive_is_decided_after_15_seconds() -> None:
     handover = SimpleNamespace(_clock=clock, requests={})
     await Handover._expire(cast(Any, handover), cast(Any, SimpleNamespace(device=1)))
     assert 13 < waits[0] < 17
+
+
+# Motors of programs that ended
+
+
+@pytest.mark.parametrize(("acts_after", "grace"), [(0.0, 2.0), (4.0, 4.0), (60.0, 10.0)])
+async def test_motor_may_be_taken_over_for_two_to_ten_seconds(
+    acts_after: float, grace: float
+) -> None:
+    ends: list[float] = []
+
+    def announce(_device: int, _program: object, end: float, **_: object) -> None:
+        ends.append(end)
+        raise Once
+
+    starts = SimpleNamespace(is_alive=lambda _: False)
+    guard = SimpleNamespace(_starts=starts, _clock=Now(), _announce=announce)
+    record = SimpleNamespace(device=1, acts_after=acts_after)
+    with pytest.raises(Once):
+        await OrphanMotorGuard._stop_unless_taken(
+            cast(Any, guard), cast(Any, record), cast(Any, None), takers=True, left=1000.0
+        )
+    assert ends == [pytest.approx(1000.0 + grace)]
+
+
+async def test_motor_on_a_lost_line_is_stopped_for_ten_minutes() -> None:
+    now = Now()
+
+    async def until_ended(_: object) -> None:
+        pass
+
+    guard = SimpleNamespace(
+        _clock=now, _lost={}, _until_ended=until_ended, _is_connected=bool, _tell=lambda *_: None,
+        _line=SimpleNamespace(facts=SimpleNamespace(tell_all=lambda *_: None)),
+    )  # fmt: skip
+    session = SimpleNamespace(device=1)
+    assert not await OrphanMotorGuard._ended_by_loss(cast(Any, guard), cast(Any, session))
+    assert 595.0 < now.seconds - 1000.0 < 605.0
+
+
+async def test_stop_waits_a_second_for_a_disk(monkeypatch: pytest.MonkeyPatch) -> None:
+    waits: list[float] = []
+
+    async def opened(_path: str, _find: object, _drop: object, within: float) -> None:
+        waits.append(within)
+        raise Once
+
+    monkeypatch.setattr(sharing, "opened_beside", opened)
+    shared = SimpleNamespace(
+        _lock=SimpleNamespace(held=False), _off=False, _keeper=False, _inside=None,
+        _place=SimpleNamespace(lock_path=""), _find_holder=None, _drop_lock=None,
+    )  # fmt: skip
+    with pytest.raises(Once):
+        await sharing.Sharing.own(cast(Any, shared), lambda *_: None)
+    assert 0.8 < waits[0] < 1.2
 
 
 # Clients of Modbus TCP
