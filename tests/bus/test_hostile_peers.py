@@ -88,6 +88,20 @@ async def test_bytes_before_a_request_are_not_its_reply() -> None:
     master.close()
 
 
+async def test_reply_counts_after_a_pause_in_sending_that_is_no_suspension() -> None:
+    transport, around = CommandBlocked(b""), context([])
+    master = RtuMaster(transport, RtuTcpLink("x", 1), around, lambda: None, wire_time=False)
+
+    def pause() -> None:
+        time.sleep(FROZEN_IN_SENDING * 0.6)
+        transport.held = reply(b"\x01" + QUESTION + b"\0\0")
+
+    requested = Sending(1, QUESTION, REQUEST.expectation(), 0.5, look=pause)
+    result = await master.exchange(requested)
+    assert result.kind is ResultKind.REPLY
+    master.close()
+
+
 async def test_bytes_received_while_suspended_in_sending_are_not_a_reply() -> None:
     """Frozen between its look at the line and the request: an answer of before is there first."""
     strays: list[Piece] = []
