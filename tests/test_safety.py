@@ -28,6 +28,7 @@ from tui.bus.model import LineStatus, Priority, Timing
 from tui.bus.poll_plan import PlannedRead
 from tui.bus.program import KEEPER, Program
 from tui.bus.requests import Read, WriteOne
+from tui.bus.schedule.alive_reads import AliveReads
 from tui.bus.schedule.last_way import LastWay
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job, SentStops
@@ -47,6 +48,7 @@ from tui.screens.frame_source import _seen
 from tui.screens.monitor.run_line import RunLine
 from tui.session.command import motor_stop, under_way
 from tui.session.command.access import CommandAccess
+from tui.session.command.commander import Commander
 from tui.session.command.last_known import is_likely_to_run
 from tui.session.command.stop import Stopper
 from tui.session.drive import DriveSession
@@ -57,7 +59,9 @@ from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.reader import Reader
 from tui.session.read.slots import Slots
+from tui.session.settings.watched_values import WatchedValues
 from tui.session.sharing.handover import Handover
+from tui.session.sharing.observer_poller import ObserverPoller
 from tui.session.sharing.orphan_motors import OrphanMotorGuard
 from tui.session.starts.starts import Starts
 from tui.terminal import type_ahead
@@ -703,6 +707,51 @@ async def test_stop_waits_a_second_for_a_disk(monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(Once):
         await sharing.Sharing.own(cast(Any, shared), lambda *_: None)
     assert 0.8 < waits[0] < 1.2
+
+
+# Age of values before a command
+
+
+@pytest.mark.parametrize(("after", "fresh"), [(0.8, True), (1.2, False)])
+async def test_drive_is_armed_by_a_state_of_the_last_second(after: float, fresh: bool) -> None:
+    session, clock = session_showing(READY)
+    clock.advance(after)
+    queued: list[object] = []
+    session.work.put = lambda *given: queued.append(given)  # type: ignore[method-assign]
+    commander = SimpleNamespace(session=session)
+    Commander.arm(cast(Any, commander))
+    assert bool(queued) is not fresh
+    stop = SimpleNamespace(session=session)
+    assert ("ETA" in motor_stop.MotorStop._sure(cast(Any, stop), ["ETA"])) is fresh
+
+
+@pytest.mark.parametrize(("after", "off"), [(2.8, False), (3.2, True)])
+def test_drive_that_was_silent_for_three_seconds_was_switched_off(after: float, off: bool) -> None:
+    session, clock = session_showing(READY)
+    resets: list[bool] = []
+    values = WatchedValues(session, lambda: "ready", lambda: resets.append(True))
+    values._silent = clock.monotonic()
+    clock.advance(after)
+    values._look_for_a_reset()
+    assert resets == [True] * off
+
+
+@pytest.mark.parametrize(("after", "polls"), [(2.2, True), (2.8, False)])
+def test_drive_is_polled_for_a_quarter_of_its_timeout_after_a_heartbeat(
+    after: float, polls: bool
+) -> None:
+    poller = SimpleNamespace(
+        orphan=False, _sign=float, _requested=0.1, _stands=lambda _: False, _now=lambda: after,
+        _timeout=lambda: 10.0, _silence=float,
+    )  # fmt: skip
+    assert ObserverPoller._may_ask(cast(Any, poller)) is polls
+
+
+def test_device_is_read_four_times_in_its_timeout() -> None:
+    alive = SimpleNamespace(device=1, timeout=8.0)
+    reads = SimpleNamespace(_devices={1: SimpleNamespace(heard=100.0)}, _since={1: 0.0}, _jobs={})
+    due = AliveReads._look(cast(Any, reads), "me", cast(Any, alive), 100.0)
+    assert 1.5 < due - 100.0 < 2.5
 
 
 # Clients of Modbus TCP
