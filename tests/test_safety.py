@@ -65,7 +65,7 @@ from tui.session.sharing.observer_poller import ObserverPoller
 from tui.session.sharing.orphan_motors import OrphanMotorGuard
 from tui.session.starts.starts import Starts
 from tui.terminal import type_ahead
-from tui.terminal.bursts import Bursts
+from tui.terminal.reader import Bursts
 from tui.terminal.stroke import Stroke, attach
 from tui.terminal.tokens import KeyToken
 

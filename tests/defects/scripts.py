@@ -207,7 +207,7 @@ DEFECTS = (
     ),
     Defect(
         "start-of-a-script-not-recorded",
-        "tui/session/api/line_calls.py",
+        "tui/session/api/line.py",
         'None if opened.simulation else StartKeeper("script")',
         "None",
         "The motor of a killed script runs on.",
@@ -268,7 +268,7 @@ DEFECTS = (
     ),
     Defect(
         "line-closed-before-its-motor-rests",
-        "tui/session/api/line_calls.py",
+        "tui/session/api/line.py",
         "        self._runs.close(STANDS_WITHIN)\n",
         "",
         "A script that closes its line leaves a motor running.",

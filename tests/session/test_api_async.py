@@ -22,7 +22,7 @@ from tui.session.api import (
     NotWritten,
     open_drives_async,
 )
-from tui.session.api.line_calls import open_for_script
+from tui.session.api.line import open_for_script
 from tui.session.arming import NotArmed
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.simulator import DriveSpec, LineTiming, Simulation

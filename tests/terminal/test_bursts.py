@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.limits import BURST_GAP
-from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts
+from tui.terminal.reader import HELD_LONGEST, STEPPING, Bursts
 from tui.terminal.stroke import Pressed
 from tui.terminal.tokens import KeyToken, Paste
 

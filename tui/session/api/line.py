@@ -2,16 +2,117 @@
 
 from __future__ import annotations
 
+import asyncio
+import warnings
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from types import TracebackType
 from typing import Self
 
-from ..connect.open_line import OpenLine
+from tui.bus.api import ModbusLine, Priority
+from tui.drive.errors import DriveError
+from tui.drive.profile import library
+
+from ..connect.contradiction import Contradiction, own_words
+from ..connect.identify import DriveIdentity, identify_drive
+from ..connect.known_line import KnownLine
+from ..connect.named_lines import line_named
+from ..connect.open_line import OpenLine, open_line
+from ..drive import DriveSession
+from ..fleet import Fleet
+from ..journal import Journal
+from ..read.order_check import check_byte_order
+from ..read.reader import Reader
+from ..sharing.orphan_motors import OrphanMotorGuard
+from ..starts.keeper import StartKeeper
+from ..teaching.teacher import Teacher
 from .async_drive import AsyncDrive
 from .drive import Drive
-from .line_calls import LineCalls, open_for_script
+from .drive_calls import STANDS_WITHIN, DriveCalls
+from .guarded_run import GuardedRuns
 from .work import awaited, uninterrupted, waited
+
+CONNECTED_WITHIN = 5.0
+"""Seconds in which a line is to be connected."""
+ACCEPT_BY_SCRIPT = "If that is right, open it with accept=True."
+
+
+def open_for_script(text: str, *, read_only: bool, accept: bool) -> OpenLine:
+    """Open the line that a LINE or its name means, connected. Waits; raises LineError."""
+    named = line_named(text)
+    place = named.line if named is not None else text
+    opened = open_line(place, read_only=read_only, wait=CONNECTED_WITHIN, program="script")
+    if opened.simulation is None:
+        opened.known = KnownLine(opened.line, way=ACCEPT_BY_SCRIPT)
+        if accept:
+            opened.known.accept(all_that_comes=True)
+    return opened
+
+
+def _warn(trouble: str) -> None:
+    """Warn about the journal: the script goes on."""
+    warnings.warn(trouble, RuntimeWarning, stacklevel=1)
+
+
+class LineCalls:
+    """An open line. Coroutines run in its loop, the rest in any thread."""
+
+    def __init__(self, opened: OpenLine) -> None:
+        self._opened = opened
+        self._journal = Journal(on_trouble=_warn)
+        # the motors of a simulated line end with it
+        self._starts = None if opened.simulation else StartKeeper("script")
+        self.fleet = Fleet(opened.line, self._journal, self._starts)
+        self._runs = GuardedRuns()
+        self._orphan_guard = OrphanMotorGuard(opened.line, self._journal)
+
+    @property
+    def line(self) -> ModbusLine:
+        """The line itself."""
+        return self._opened.line
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """Differences from the stored line; while there is one, only stops are written."""
+        return self._opened.known.changed if self._opened.known is not None else ()
+
+    async def drive(self, address: int, profile: str | None) -> DriveCalls:
+        """Find a drive and keep polling it. Raises as `DriveLine.drive`."""
+        session = await self._session(address, profile)
+        await asyncio.to_thread(Teacher(session).recall)
+        return DriveCalls(self.fleet.take(session), self.fleet, self._runs)
+
+    async def _session(self, address: int, profile: str | None) -> DriveSession:
+        line = self._opened.line
+        reported: DriveIdentity | None
+        if profile is None:
+            reported = identity = await identify_drive(line, address)
+            if identity.profile is None:
+                fits = ", ".join(identity.candidates) or "any"
+                raise DriveError(
+                    f"Device {address} does not identify itself; name its profile: {fits}."
+                )
+            found = library.load(identity.profile)
+        else:
+            found = library.load(profile)
+            reported = await own_words(line, address, found)
+        session = DriveSession(line, address, found, reported)
+        if session.contradiction:
+            raise Contradiction(session.contradiction)
+        await check_byte_order(Reader(session), Priority.OPERATOR_READ)
+        if self._opened.known is not None:
+            self._opened.known.note(reported, address, found.id)
+        return session
+
+    def close(self) -> None:
+        """Close the line; waits until motors of blocks are at rest and its thread has ended."""
+        self._runs.close(STANDS_WITHIN)
+        self._orphan_guard.close()
+        self.fleet.forget()
+        self._opened.close()
+        self._journal.close()
+        if self._starts is not None:
+            self._starts.close()
 
 
 def open_drives(text: str, *, read_only: bool = False, accept: bool = False) -> DriveLine:
