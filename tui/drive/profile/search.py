@@ -35,7 +35,7 @@ def plain_letters(text: str) -> str:
     """Return a text in small letters without accents: `Décélération` is `deceleration`."""
     if text.isascii():
         return text.casefold()
-    split = unicodedata.normalize("NFKD", text.casefold().replace("œ", "oe"))
+    split = unicodedata.normalize("NFKD", text.casefold().replace("\u0153", "oe"))
     return "".join(letter for letter in split if not unicodedata.combining(letter))
 
 
