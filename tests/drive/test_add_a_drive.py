@@ -20,8 +20,10 @@ README = Path(__file__).parents[2] / "profiles" / "README.md"
 
 
 def example() -> str:
-    """The profile in the document: its one TOML block."""
-    (found,) = re.findall(r"^```toml\n(.*?)^```$", README.read_text("utf-8"), re.M | re.S)
+    """The profile in the document: its one TOML block with a profile."""
+    (found,) = re.findall(
+        r"^```toml\n(\[profile\]\n.*?)^```$", README.read_text("utf-8"), re.M | re.S
+    )
     return str(found)
 
 

@@ -24,9 +24,9 @@ PUMP = "example-pump"
 
 @pytest.fixture
 def own_file() -> Path:
-    """The one TOML block of the README, in the configuration folder."""
+    """The one profile in the README, in the configuration folder."""
     [text] = re.findall(
-        r"^```toml\n(.*?)^```$", README.read_text("utf-8"), re.MULTILINE | re.DOTALL
+        r"^```toml\n(\[profile\]\n.*?)^```$", README.read_text("utf-8"), re.MULTILINE | re.DOTALL
     )
     folder = library.user_folder()
     folder.mkdir(parents=True)

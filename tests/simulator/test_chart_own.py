@@ -21,7 +21,9 @@ README = Path(__file__).parents[2] / "profiles" / "README.md"
 
 def pump() -> Profile:
     """The example of profiles/README.md."""
-    [text] = re.findall(r"^```toml\n(.*?)^```$", README.read_text("utf-8"), re.M | re.S)
+    [text] = re.findall(
+        r"^```toml\n(\[profile\]\n.*?)^```$", README.read_text("utf-8"), re.M | re.S
+    )
     return Profile(msgspec.toml.decode(text.encode(), type=ProfileData))
 
 
