@@ -9,12 +9,15 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from tests.internal_errors import no_internal_errors
 from tui.bus.limits import Limits
 from tui.bus.line import Line, Timing
 from tui.bus.link import Link, SerialLink
 
 if TYPE_CHECKING:
     from .sharing import SharedLines
+
+__all__ = ["no_internal_errors"]
 
 WIDE = Limits(
     functions=frozenset({3, 6, 8, 16, 23, 43}),

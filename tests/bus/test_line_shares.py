@@ -10,7 +10,7 @@ from collections.abc import Callable
 import pytest
 
 from tui.bus.api import Priority, Reply
-from tui.bus.errors import LineClosed, LineLost, RequestRefused
+from tui.bus.errors import OUTCOME_UNKNOWN, LineClosed, LineFailed, LineLost, RequestRefused
 from tui.bus.line import Timing
 from tui.bus.master import ExchangeResult, ResultKind, Sending
 from tui.bus.requests import Read, WriteOne
@@ -333,3 +333,24 @@ async def test_reply_is_due_after_its_exchange_was_cut_short() -> None:
     await asyncio.wait([serving])
     assert line.dispatcher.in_flight
     assert isinstance(job.answer.exception(0), LineClosed)
+
+
+@pytest.mark.parametrize(("word", "unknown"), [(None, False), (7, True)])
+async def test_internal_error_during_an_exchange_fails_its_request(
+    word: int | None, unknown: bool
+) -> None:
+    """A write may have taken effect."""
+    line = TimedLine()
+
+    async def breaks(sending: Sending) -> ExchangeResult:
+        raise ZeroDivisionError("on purpose")
+
+    line.exchange = breaks  # type: ignore[method-assign]
+    line.end = math.inf
+    job = line.ask(Priority.OPERATOR_WRITE, word=word)
+    with pytest.raises(ZeroDivisionError):
+        await line.dispatcher.serve(line)  # type: ignore[arg-type]
+    error = job.answer.exception(0)
+    assert isinstance(error, LineFailed)
+    assert str(error).startswith("The request failed: ZeroDivisionError('on purpose').")
+    assert str(error).endswith(OUTCOME_UNKNOWN) is unknown

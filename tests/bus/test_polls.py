@@ -216,7 +216,7 @@ async def test_polling_pauses_while_the_subscriber_reads_nothing(
         for each in (subscriber, other):
             await asyncio.to_thread(each.await_turns, 2)
         client = client_of(owner, "watch")
-        writer, full = client.writer, FullWriter(MOST_UNTAKEN + 1)
+        writer, full = client.writer, FullWriter(client.writer, MOST_UNTAKEN + 1)
         in_loop(owner, lambda: setattr(client, "writer", full))
         eventually(lambda: client.writer is full)
         await owner.read(1, 900)
@@ -232,8 +232,9 @@ async def test_polling_pauses_while_the_subscriber_reads_nothing(
 class FullWriter:
     """A connection whose other end reads nothing."""
 
-    def __init__(self, unread: int) -> None:
+    def __init__(self, real: asyncio.StreamWriter, unread: int) -> None:
         assert unread < MOST_UNREAD
+        self.get_extra_info = real.get_extra_info
         self.transport = SimpleNamespace(
             get_write_buffer_size=lambda: unread, is_closing=bool, abort=bool
         )

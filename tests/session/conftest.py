@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from tests.internal_errors import no_internal_errors
+
+__all__ = ["no_internal_errors"]
+
 
 @pytest.fixture(autouse=True)
 def patience(patient_lines: None) -> None:

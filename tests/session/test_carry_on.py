@@ -17,6 +17,7 @@ def test_closed_line_is_raised() -> None:
         carried_on(raising(LineClosed()))
 
 
+@pytest.mark.internal_errors
 def test_internal_error_is_logged(caplog: pytest.LogCaptureFixture) -> None:
     carried_on(raising(ZeroDivisionError("an error of ours")))
     (record,) = caplog.records

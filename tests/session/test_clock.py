@@ -16,6 +16,7 @@ from tests.limits import ARMED_FOR
 from tui.bus.api import LineState, LineStatus
 from tui.bus.limits import Limits
 from tui.bus.line import Line
+from tui.bus.link import SerialLink
 from tui.bus.shared_state import SharedState
 from tui.drive.profile import library
 from tui.session.clock import Clock
@@ -68,6 +69,7 @@ class ConnectedLine:
     state = LineState(LineStatus.CONNECTED, "", 0.0)
     held = ""
     facts = SharedState()
+    link = SerialLink("/dev/none")
 
     def describe(self, _device: int, _limits: Limits) -> None:
         """The limits of a device do not matter here."""

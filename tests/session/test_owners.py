@@ -111,6 +111,7 @@ async def test_possibly_changed_value_is_kept_but_not_trusted() -> None:
 # Watching
 
 
+@pytest.mark.internal_errors
 async def test_monitor_with_an_internal_error_reports_it_and_restarts(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -136,6 +137,7 @@ async def test_monitor_with_an_internal_error_reports_it_and_restarts(
         await until(lambda: monitor.latest is not None and not monitor.latest.error)
 
 
+@pytest.mark.internal_errors
 async def test_listener_that_raises_affects_no_other(caplog: pytest.LogCaptureFixture) -> None:
     async with bench("atv71") as here:
         monitor = here.console.monitor

@@ -192,6 +192,7 @@ def room_of(place: Place) -> str:
 )
 @pytest.mark.parametrize("attached", [False, True], ids=["direct", "attached"])
 @pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.internal_errors
 def test_error_anywhere_in_a_stop_does_not_prevent_its_frame(
     wire: Wire,
     room: str,

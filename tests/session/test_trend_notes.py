@@ -124,6 +124,7 @@ def test_notes_with_long_names_can_be_sent() -> None:
         [TrendPoint(100.0, (1.0,))],
     ],
 )
+@pytest.mark.internal_errors
 def test_points_that_cannot_be_drawn_are_omitted(points: list[TrendPoint]) -> None:
     holder = LineHolder()
     kind = Trend(ATV71).kind

@@ -347,6 +347,7 @@ async def test_failed_last_task_drops_nothing(reported: Notified) -> None:
     assert reported.outcome() == (OutcomeKind.REFUSED, "The drive is in fault.")
 
 
+@pytest.mark.internal_errors
 async def test_unforeseen_error_clears_the_queue(reported: Notified) -> None:
     reported.put("a", error=ZeroDivisionError("none"))
     reported.put("b")
