@@ -461,7 +461,7 @@ def test_number_fields_accept_no_space() -> None:
     fields = {
         path.relative_to(SOURCES).as_posix(): {
             name
-            for name in ("Field", "FilterField", "NumberInput")
+            for name in ("Field", "WordField", "NumberInput")
             if re.search(rf"\b{name}\(", text)
         }
         for path in SOURCES.rglob("*.py")
@@ -470,10 +470,10 @@ def test_number_fields_accept_no_space() -> None:
     assert {name: kinds for name, kinds in fields.items() if kinds} == {
         "parameters/edit_value.py": {"NumberInput"},
         "connection/line_form.py": {"NumberInput"},
-        "dialogs/palette.py": {"FilterField"},
-        "parameters/screen.py": {"FilterField"},
-        "blocks/pick_parameter.py": {"FilterField"},
-        "frames/frame_list.py": {"FilterField"},
+        "choosing.py": {"WordField"},
+        "parameters/screen.py": {"WordField"},
+        "blocks/pick_parameter.py": {"WordField"},
+        "frames/frame_list.py": {"WordField"},
     }
     numbers = {
         ast.unparse(call.args[0])

@@ -23,6 +23,7 @@ from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.drive.profile import library
 from tui.screens.command.control import Control
+from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.keys.action import CONNECTION, LISTENING, OPENING, Action
 from tui.screens.keys.screens import EVERYWHERE, TABBED
@@ -30,6 +31,7 @@ from tui.screens.keys.table import ACTIONS, elsewhere, key_meanings, keys_line
 from tui.screens.monitor.screen import order_keys
 from tui.screens.open_lines import LineOpening
 from tui.screens.parameters.screen import ParametersScreen
+from tui.widgets.fields import NumberInput, WordField
 from tui.widgets.palette import ATTENTION
 
 from . import fakes
@@ -126,6 +128,40 @@ def test_every_key_has_a_meaning_on_its_screen() -> None:
     assert elsewhere("monitor", "w") == "w has a meaning on Parameters (3) and Scanner (4)."
     assert elsewhere("monitor", "r") == ""
     assert elsewhere("monitor", "Y", "Y") == ""
+    assert elsewhere("monitor", "P", "P").startswith("P has a meaning on Control (6)")
+
+
+def test_a_capital_letter_names_caps_lock_if_the_small_one_works_here() -> None:
+    run = "Is Caps Lock on? x means: Reset the fault."
+    assert run in elsewhere("monitor", "X", "X")
+    assert elsewhere("monitor", "K", "K").startswith("Is Caps Lock on? k means: Quick stop")
+    assert "Caps Lock" not in elsewhere("line", "K", "K")
+
+
+async def test_digits_of_a_french_keyboard_open_screens_and_are_typed_in_numbers() -> None:
+    async with bench("atv71") as made:
+        await until(made.pilot, lambda: made.app.place == "monitor")
+        for key, place in (("quotation_mark", "parameters"), ("é", "monitor")):
+            await made.pilot.press(key)
+            await until(made.pilot, lambda: made.app.place == place)  # noqa: B023
+        await made.pilot.press("a", "r", "quotation_mark", "à", "full_stop", "left_parenthesis")
+        await until(made.pilot, lambda: "30.5" in shown(made.app, "message"))
+        assert writes(made.app) == []
+        await made.pilot.press("escape")
+        made.app.push_screen(Ask("Current", str, number=True))
+        await until(made.pilot, lambda: isinstance(made.app.focused, NumberInput))
+        await made.pilot.press("ampersand", "é", ".", "ç", "minus")
+        field = made.app.focused
+        assert isinstance(field, NumberInput)
+        assert field.value == "12.9-"
+        await made.pilot.press("left", "left", "backspace", "2")
+        assert field.value == "1229-"
+        # a search has its words as they were typed
+        await made.pilot.press("escape", "slash", "é", "ç")
+        await until(made.pilot, lambda: isinstance(made.app.focused, WordField))
+        words = made.app.focused
+        assert isinstance(words, WordField)
+        await until(made.pilot, lambda: words.words == "éç")
 
 
 KEY_OF = {tab.name: tab.digit for tab in TABBED}
@@ -321,7 +357,7 @@ async def back_to(made: Bench, screen: str) -> None:
 
 # Keys that do not wait until it is known whether they came alone
 
-SHOW_EVERYWHERE = {*"1234567", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l"}
+SHOW_EVERYWHERE = {*"1234567", *"&é\"'(è", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l"}
 ARROWS = {"up", "down", "pageup", "pagedown"}
 SHOW = {
     "line": set(),

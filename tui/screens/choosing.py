@@ -12,7 +12,7 @@ from textual.widgets import OptionList
 
 from tui.screens.keys.finding import FoundAction, find
 from tui.widgets.drawing import cut
-from tui.widgets.fields import JOINS_KEY, FilterField
+from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.palette import FAINT, KEY, PLAIN
 from tui.widgets.plain import Plain, entry
 
@@ -49,7 +49,7 @@ class Palette(Question[FoundAction | None]):
         """A field, and what fits what is typed there."""
         with Vertical(id="dialog"):
             yield Plain("Find an action", id="question")
-            yield FilterField(
+            yield WordField(
                 placeholder="Type a word, for example eeprom, ramp, frames", id="search"
             )
             yield OptionList(id="choices", compact=True)
@@ -63,7 +63,7 @@ class Palette(Question[FoundAction | None]):
 
     def on_input_changed(self) -> None:
         """Less, as more is typed."""
-        self._list(self.query_one(FilterField).words)
+        self._list(self.query_one(WordField).words)
 
     def _list(self, query: str) -> None:
         self._found = find(query, self._of)

@@ -17,6 +17,12 @@ from textual.keys import Keys, _character_to_key
 STOP_KEYS: Final = frozenset({"space", "f12", "f9"})
 """Keys that stop a motor."""
 
+UNSHIFTED_DIGITS: Final = dict(zip("&é\"'(è_çà", "123457890", strict=True))
+"""Digits by the character that their key sends without Shift on a French keyboard (AZERTY).
+
+Its 6 sends a minus, which is a sign in a number and a key of some screens.
+"""
+
 Named = tuple[str, str | None]
 """A key as Textual names it, and the character it types, if any."""
 
@@ -55,6 +61,11 @@ _LOCKS = 64 | 128
 _RELEASED = 3
 _OTHER_KEYS = 27
 """xterm's modifyOtherKeys: ESC [ 27 ; modifiers ; character ~"""
+
+
+def unshifted_digit(character: str) -> str:
+    """Return the digit of a key that sends another character without Shift, else the character."""
+    return UNSHIFTED_DIGITS.get(character, character)
 
 
 def character_name(character: str) -> Named | None:

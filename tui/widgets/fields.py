@@ -5,7 +5,10 @@ from __future__ import annotations
 import re
 from typing import Any, ClassVar, Final
 
+from textual.events import Key
 from textual.widgets import Input
+
+from tui.terminal.names import unshifted_digit
 
 from .plain import Signs
 
@@ -26,6 +29,10 @@ class Field(Input):
     takes_space: ClassVar[bool] = True
     """True if Space is typed into it; where it is not, Space stops the motor there too."""
 
+    def check_consume_key(self, key: str, character: str | None) -> bool:
+        """Space stops the motor where it is not a character of the text."""
+        return (key != "space" or self.takes_space) and super().check_consume_key(key, character)
+
     def __init__(self, value: str = "", **how: Any) -> None:
         super().__init__(value, highlighter=Signs(), compact=True, **how)
 
@@ -35,13 +42,19 @@ class NumberInput(Field):
 
     takes_space = False
 
-    def check_consume_key(self, key: str, character: str | None) -> bool:
-        """Space is left to the stop."""
-        return key != "space" and super().check_consume_key(key, character)
+    def on_key(self, event: Key) -> None:
+        """Type the digit of a key that sends it only with Shift, as on a French keyboard."""
+        typed = event.character or ""
+        if (digit := unshifted_digit(typed)) != typed:
+            event.stop()
+            event.prevent_default()
+            self.replace(digit, *self.selection)
 
 
-class FilterField(NumberInput):
-    """A field that filters a list while one types: Space stops the motor here too."""
+class WordField(Field):
+    """A field for words that filter a list, or for a name: Space stops the motor here too."""
+
+    takes_space = False
 
     @property
     def words(self) -> str:

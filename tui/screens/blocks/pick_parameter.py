@@ -16,7 +16,7 @@ from tui.drive.blocks.picking import choices
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.widgets.drawing import fitted_names
-from tui.widgets.fields import JOINS_KEY, FilterField
+from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
@@ -48,7 +48,7 @@ class PickParameter(Question[str | None]):
         """A search, and what it finds."""
         with Vertical(id="dialog"):
             yield Plain(f"{self._slot} is mapped to", id="question")
-            yield FilterField(placeholder="code, number, address or name", id="search")
+            yield WordField(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
             yield Plain(PICK_HINT, id="hint")
@@ -61,7 +61,7 @@ class PickParameter(Question[str | None]):
 
     def on_input_changed(self) -> None:
         """Fewer, as more is typed."""
-        self._list(self.query_one(FilterField).words)
+        self._list(self.query_one(WordField).words)
 
     def _list(self, search: str) -> None:
         every = choices(self._profile, self._block, search)
@@ -80,7 +80,7 @@ class PickParameter(Question[str | None]):
         """Give the names the new width; the choice stays."""
         options = self.query_one(OptionList)
         at = options.highlighted
-        self._list(self.query_one(FilterField).words)
+        self._list(self.query_one(WordField).words)
         options.highlighted = at if at is not None else options.highlighted
 
     def action_step(self, step: int) -> None:

@@ -15,7 +15,7 @@ from textual.widgets import Input
 
 from tui.drive.plain import plain
 from tui.session.connect.addresses import parse_addresses
-from tui.widgets.fields import NumberInput
+from tui.widgets.fields import NumberInput, WordField
 from tui.widgets.lines import Lines
 from tui.widgets.palette import SURFACE, TEXT
 from tui.widgets.plain import Plain
@@ -78,7 +78,7 @@ class LineForm(Vertical):
         self._fields = {
             "baud": NumberInput(BAUD, id="baud", type="integer", max_length=6),
             "format": NumberInput(FORMAT, id="format", max_length=3),
-            "profile": NumberInput("", id="profile", placeholder="identify"),
+            "profile": WordField("", id="profile", placeholder="identify"),
             "addresses": NumberInput(ADDRESSES, id="addresses"),
         }
         self._picture: Lines | None = Lines(fit=self._drawn)

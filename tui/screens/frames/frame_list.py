@@ -14,7 +14,7 @@ from tui.bus.api import Frame
 from tui.bus.link import Link, TcpLink, label
 from tui.drive.profile.profile import Profile
 from tui.widgets.drawing import rule
-from tui.widgets.fields import JOINS_KEY, FilterField
+from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.lines import Lines
 from tui.widgets.plain import Plain
 
@@ -78,7 +78,7 @@ class FrameListScreen(PanelScreen):
         yield Lines(id="frames")
         with Horizontal(id="wanted"):
             yield Plain("", id="which")
-            yield FilterField(id="typed")
+            yield WordField(id="typed")
 
     def on_mount(self) -> None:
         """Nothing is asked for yet."""
@@ -232,7 +232,7 @@ class FrameListScreen(PanelScreen):
     @property
     def _wanted(self) -> str:
         """The typed words."""
-        return self.query_one(FilterField).words
+        return self.query_one(WordField).words
 
     def on_input_changed(self) -> None:
         """Apply a typed filter at once."""

@@ -10,6 +10,7 @@ from functools import cache, partial
 
 from textual.binding import Binding, BindingType
 
+from tui.terminal.names import UNSHIFTED_DIGITS
 from tui.widgets.drawing import KeyLabel, fitting
 
 from .action import Action
@@ -42,6 +43,12 @@ ACCEPT = "Accept the changed line: another adapter, or other drives. Asks first.
 BUNDLE = "Bundle everything about the line in one file, for a colleague."
 EEPROM = "Save the settings to the drive's EEPROM, if it needs that. Needs arming; asks first."
 
+
+def _digit_keys(digit: str) -> str:
+    """A digit, and what its key sends without Shift on a French keyboard."""
+    return ",".join([digit, *(sent for sent, typed in UNSHIFTED_DIGITS.items() if typed == digit)])
+
+
 STOP_ACTIONS: tuple[Action, ...] = (
     stops("stop_by_space", "space", "STOP", STOP),
     stops("stop", "f12", "", STOP_ANYWHERE),
@@ -49,7 +56,9 @@ STOP_ACTIONS: tuple[Action, ...] = (
 )
 APP_ACTIONS: tuple[Action, ...] = (
     *(
-        app_action(f"goto({screen.name!r})", screen.digit, "", f"Go to {screen.title}.")
+        app_action(
+            f"goto({screen.name!r})", _digit_keys(screen.digit), "", f"Go to {screen.title}."
+        )
         for screen in TABBED
     ),
     app_action("step_drive(-1)", "[", "", "Go to the previous drive on this line."),
@@ -164,6 +173,7 @@ def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
     return keys if stops in (STOPS_ALL, STOPS_NOBODY) else [*keys, ("stop_all", "F9", STOPS_ALL)]
 
 
+CAPS_LOCK = "Is Caps Lock on? {key} means: {help}"
 SHELL_KEYS = {"ctrl+z": "Ctrl+Z", "ctrl+backslash": "Ctrl+\\"}
 """Keys by which a shell suspends or ends a program; Ctrl+C has an action of its own."""
 
@@ -171,14 +181,23 @@ SHELL_KEYS = {"ctrl+z": "Ctrl+Z", "ctrl+backslash": "Ctrl+\\"}
 def elsewhere(screen: str, key: str, character: str | None = None) -> str:
     """Return which screen uses a key that this one does not know; empty if none.
 
-    Of a key with a sign the table has the `character`, as `*`, and not its name.
+    Of a key with a sign the table has the `character`, as `*`, and not its name. If the small
+    letter works here, the text asks whether Caps Lock is on.
     """
     if shell_key := SHELL_KEYS.get(key):
         return f"{shell_key} ends nothing here: q leaves the panel."
     keys = {key, character}
     found = [a for a in ACTIONS if keys & {*a.keys.split(",")} and screen not in a.screens]
-    if not found:
-        return ""
+    texts = [_works_on(found)] if found else []
+    small = key.lower()
+    if key != small and len(key) == 1 and small in key_meanings(screen):
+        action = next(a for a in screen_actions(screen) if small in a.keys.split(","))
+        texts.append(CAPS_LOCK.format(key=small, help=action.help))
+    return " ".join(texts)
+
+
+def _works_on(found: Sequence[Action]) -> str:
+    """The screens on which a key works, by its actions."""
     first = found[0]
     names = {tab.name: f"{tab.title} ({tab.digit})" for tab in TABBED}
     where = [names[a.screens[0]] for a in found if a.screens[0] in names] or ["another screen"]

@@ -14,6 +14,7 @@ from tui.bus.errors import LineError
 from tui.session.command.reference import reference_codes
 from tui.session.drive_state import with_direction
 from tui.session.shown import Shown
+from tui.terminal.names import unshifted_digit
 from tui.terminal.stroke import stroke_of
 from tui.widgets.drawing import key_line, key_styles
 from tui.widgets.palette import FAINT
@@ -121,7 +122,9 @@ class RunKeys(OrderKeys):
             self._line = line.erased()
         elif key == "enter":
             self._line = self._entered(line, event)
-        elif event.character and (typed := line.typed(event.character)) is not None:
+        elif (
+            event.character and (typed := line.typed(unshifted_digit(event.character))) is not None
+        ):
             self._line = typed
         self.look()
 

@@ -6,7 +6,7 @@ from textual.widgets import Input
 
 from tui.session.console import DriveConsole
 from tui.session.settings.editor import Editor
-from tui.widgets.fields import FilterField
+from tui.widgets.fields import WordField
 
 from ..command.teaching import TeachKeys
 from .parameter_list import ParameterList
@@ -30,7 +30,7 @@ class ParameterKeys(TeachKeys):
 
     def list_again(self) -> None:
         """Make the list again, by the choice and the search."""
-        for search in self.query(FilterField):  # none once the screen was left
+        for search in self.query(WordField):  # none once the screen was left
             self.listed.fill(self.editor, search.words)
             self.look()
 

@@ -24,7 +24,7 @@ from tui.screens.parameters.group_view import FILTER_LABELS, group_lines
 from tui.screens.parameters.parameter_list import shows_steps
 from tui.screens.parameters.start_up_view import step_help
 from tui.screens.parameters.table_view import head_line, layout_of, row_line
-from tui.widgets.fields import JOINS_KEY, FilterField
+from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, KEY
 from tui.widgets.plain import Plain
@@ -54,7 +54,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             with Vertical(id="left"):
                 with Horizontal(id="find"):
                     yield Plain(Text(" / ", KEY), id="slash")
-                    yield FilterField(placeholder="search", id="search")
+                    yield WordField(placeholder="search", id="search")
                 yield Lines(id="groups")
             with Vertical(id="right"):
                 yield Lines(id="columns")
