@@ -307,7 +307,7 @@ class Monitor:
         if snapshot.state.kind in RESET_NEAR:
             self.reader.distrust()
         self._latest = snapshot
-        self._notes.add(self._trend.add(snapshot))
+        self._notes.add(self._trend.add(snapshot, self.session.edits_written))
         self._hand_out(snapshot)
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from typing import Literal, get_args
 
 import msgspec
 
@@ -13,7 +14,7 @@ from tui.bus.line_events import LineEvent, NoteReceived
 from tui.bus.notes import LONGEST_KIND, LineNote
 from tui.bus.shared_state import SharedState
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Quantity
+from tui.drive.profile.schema import Parameter, Quantity
 
 from ..drive_state import DriveState, with_direction
 from ..reading import Reading, with_text
@@ -25,6 +26,11 @@ TREND_QUANTITIES: tuple[Quantity, ...] = (
     "motor_current",
     "frequency_reference",
 )
+READOUT_NAMES: dict[Quantity, tuple[str, ...]] = {
+    "output_frequency": ("output frequency",),
+    "motor_current": ("motor current", "output current"),
+}
+"""Names by which a family has a quantity that no manual confirms; its value is shown raw."""
 DIRECTED = frozenset({"output_frequency", "frequency_reference"})
 """Quantities whose sign is the direction of the motor."""
 
@@ -35,6 +41,26 @@ class TrendPoint:
 
     time: float
     values: tuple[float | None, ...]
+    mark: str = ""
+    """A TrendMark, or empty; a program of another version may leave others."""
+
+
+TrendMark = Literal["lost", "trip", "stop", "start", "reset", "write", "reference"]
+"""Event in a trend: the drive stopped answering, tripped, stopped, started, was reset, got
+settings by an edit, or got another reference."""
+TREND_MARKS: tuple[TrendMark, ...] = get_args(TrendMark)
+"""All of them, the most urgent first."""
+REFERENCE_STEP = 0.5
+"""Least change of a reference, in its unit, that is marked; smaller ones are noise of an input."""
+
+
+def readout_parameter(profile: Profile, quantity: Quantity) -> Parameter | None:
+    """Return the parameter of a quantity, confirmed by a manual or only by its name."""
+    if (parameter := profile.quantity(quantity)) is not None:
+        return parameter
+    watched = (profile[value.parameter] for value in profile.data.monitoring.values)
+    names = READOUT_NAMES.get(quantity, ())
+    return next((p for p in watched if p.name.casefold() in names), None)
 
 
 class Trend:
@@ -43,8 +69,9 @@ class Trend:
     def __init__(self, profile: Profile, points: Iterable[TrendPoint] = ()) -> None:
         self._profile = profile
         self._points = deque(points)
-        found = (profile.quantity(quantity) for quantity in TREND_QUANTITIES)
+        found = (readout_parameter(profile, quantity) for quantity in TREND_QUANTITIES)
         self._codes = [parameter.code if parameter else None for parameter in found]
+        self._marker = TrendMarker()
 
     @property
     def points(self) -> tuple[TrendPoint, ...]:
@@ -67,8 +94,11 @@ class Trend:
         times = sorted(point for point in points if point >= last - TREND_SECONDS)
         self._points = deque(points[time] for time in times)
 
-    def add(self, snapshot: Snapshot) -> TrendPoint:
-        """Add a cycle; a failed cycle leaves a gap, never a repeated value."""
+    def add(self, snapshot: Snapshot, edits: int = 0) -> TrendPoint:
+        """Add a cycle; a failed cycle leaves a gap, never a repeated value.
+
+        `edits` is the number of settings that this program has written to the drive so far.
+        """
         readings = with_text(snapshot.readings)
         values = tuple(
             trend_value(readings[code], snapshot.state)
@@ -76,11 +106,67 @@ class Trend:
             else None
             for code in self._codes
         )
-        point = TrendPoint(snapshot.time, values)
+        mark = self._marker.mark(snapshot, values[REFERENCE_PLACE], edits)
+        point = TrendPoint(snapshot.time, values, mark)
         self._points.append(point)
         while self._points[0].time < snapshot.time - TREND_SECONDS:
             self._points.popleft()
         return point
+
+
+REFERENCE_PLACE = TREND_QUANTITIES.index("frequency_reference")
+"""Place of the reference among the values of a point."""
+
+
+class TrendMarker:
+    """Finds the events between one cycle and the next."""
+
+    def __init__(self) -> None:
+        self._kind = ""
+        """Kind of the last state, empty before the first and after a failed cycle."""
+        self._failed = True
+        self._references: tuple[float | None, float | None] = (None, None)
+        self._edits = 0
+
+    def mark(self, snapshot: Snapshot, reference: float | None, edits: int) -> str:
+        """Return the most urgent event since the last cycle; empty without one."""
+        found = set(self._events(snapshot, reference, edits))
+        self._failed = bool(snapshot.error)
+        kind = snapshot.state.kind
+        self._kind = "" if self._failed or kind == "unknown" else kind
+        self._references = (self._references[1], reference)
+        self._edits = edits
+        return next((mark for mark in TREND_MARKS if mark in found), "")
+
+    def _events(
+        self, snapshot: Snapshot, reference: float | None, edits: int
+    ) -> Iterator[TrendMark]:
+        if snapshot.error:
+            if not self._failed:
+                yield "lost"
+            return
+        if edits > self._edits:
+            yield "write"
+        before, kind = self._kind, snapshot.state.kind
+        if before and kind not in (before, "unknown"):
+            yield from _change(before, kind)
+        earlier, last = self._references
+        if reference is None or last is None or earlier != last:
+            return  # an analog input changes with each cycle: only a step from rest is an event
+        if abs(reference - last) >= REFERENCE_STEP:
+            yield "reference"
+
+
+def _change(before: str, kind: str) -> Iterator[TrendMark]:
+    """Yield the events of a change from one kind of state to another."""
+    if kind == "fault":
+        yield "trip"
+    elif before == "fault":
+        yield "reset"
+    elif before == "running":
+        yield "stop"
+    if kind == "running":
+        yield "start"
 
 
 def trend_value(reading: Reading, state: DriveState) -> float | None:

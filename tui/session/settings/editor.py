@@ -216,6 +216,7 @@ class Editor:
 
     def _applied(self, applied: Applied) -> None:
         self._mark(self.marks.edited([result.edit.code for result in applied.written]))
+        self.session.edits_written += len(applied.written)
         self.waits_for_reset |= set(applied.after_reset)
         self.moved = next((link for link in applied.links if link.at_once), None)
 
@@ -223,6 +224,7 @@ class Editor:
         """After a stop, unstage what the drive holds, and keep the rest."""
         done = self.staging.drop_written()
         self._mark(self.marks.edited(done))
+        self.session.edits_written += len(done)
         with suppress(LineError):
             self.session.line.spawn(self._see_what_is_held, f"edits {self.session.device}")
         left = len(self.staging.edits)
