@@ -62,14 +62,15 @@ LOW_SECONDS = 6.0
 def word_sign(text: str) -> tuple[object, ...]:
     """The bit word that Monitor shows first: its title and bit names.
 
-    If the trend is shown instead, that.
+    If the curve or all values are shown instead, that.
     """
     rows = text.split("\n")
     for y, row in enumerate(rows):
         if title := re.match(r" ?([A-Z]\w+(?: .*)?) ─+ 16#", row):
             bits = takewhile(re.compile(r" +\d+ [●·] ").match, rows[y + 1 :])
             return title[1], *(row[5:13].strip() for row in bits)
-    return ("trend",) if any(re.match(r" +-\d+ (s|min) +now\b", row) for row in rows) else ()
+    named = ("All values", "output")
+    return next(((name,) for name in named if any(name in row for row in rows[7:10])), ())
 
 
 def saying(*words: str) -> Callable[[str], tuple[object, ...]]:

@@ -115,8 +115,8 @@ DEFECTS = (
     Defect(
         "no-journal-not-on-the-strip",
         "tui/widgets/strip.py",
-        "    if view.off_record:\n        text.append(off_record, ALARM)\n",
-        "",
+        'else "NO JOURNAL", ALARM)',
+        'else "", ALARM)',
         "The panel commands motors without showing that nothing is recorded.",
         ("tests/ui/test_strip.py",),
     ),

@@ -57,7 +57,7 @@ def test_only_a_step_of_a_steady_reference_is_marked(
     assert [marker.mark(RUNNING, reference, 0) for reference in references] == expected
 
 
-def test_an_edit_is_marked_and_a_trip_matters_more() -> None:
+def test_edit_is_marked_and_a_trip_matters_more() -> None:
     marker = TrendMarker()
     found = [
         marker.mark(snapshot, 50.0, edits)
@@ -66,7 +66,7 @@ def test_an_edit_is_marked_and_a_trip_matters_more() -> None:
     assert found == ["", "write", "", "trip", ""]
 
 
-def test_the_mark_is_kept_with_its_point_and_for_the_next_program() -> None:
+def test_mark_is_kept_with_its_point_and_for_the_next_program() -> None:
     trend = Trend(ATV71)
     trend.add(READY)
     point = trend.add(replace(RUNNING, time=READY.time + 1))
@@ -80,7 +80,7 @@ def test_the_mark_is_kept_with_its_point_and_for_the_next_program() -> None:
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
-def test_a_family_without_a_confirmed_frequency_keeps_its_raw_values(family: str) -> None:
+def test_family_without_a_confirmed_frequency_keeps_its_raw_values(family: str) -> None:
     profile = library.load(family)
     assert profile.quantity("output_frequency") is None
     output = readout_parameter(profile, "output_frequency")

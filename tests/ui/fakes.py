@@ -14,6 +14,7 @@ from tui.app import DrivePanelApp
 from tui.bus.api import (
     DeviceState,
     Frame,
+    LastMinute,
     LineCounters,
     LineState,
     LineStatus,
@@ -70,6 +71,8 @@ STORED = {
     "EP0": 0x0637, "IP0": 0x0812, "CMP0": 0x000F, "CRP0": 0x0015,
 }  # fmt: skip
 FOLDER = Path("/var/lib/drivepanel")
+MARKS = {21: "start", 90: "write"}
+"""Events of the trend, by the number of the point."""
 
 
 class StillClock(Clock):
@@ -159,8 +162,9 @@ class StillArming(Arming):
 
 
 COUNTED = LineCounters(
-    requests=1204, replies=1203, timeouts=1, bytes_out=9632, bytes_in=30120, busy_seconds=31.0
-)
+    requests=1204, replies=1203, timeouts=1, bytes_out=9632, bytes_in=30120, busy_seconds=31.0,
+    minute=LastMinute(good=119, lost=1),
+)  # fmt: skip
 FRAMES = (
     Frame(NOW - 0.6, "out", bytes.fromhex("02030c1e0004276c")),
     Frame(NOW - 0.59, "in", bytes.fromhex("02030800280258 01f4000052b0".replace(" ", ""))),
@@ -271,14 +275,16 @@ def console_of(
     session = DriveSession(StillLine(line), device, library.load(family), identity)
     session.arming = session.work.arming = StillArming(session.line, armed)
     way = -1.0 if snapshot and snapshot.state.direction == "reverse" else 1.0
+    raw = session.profile.quantity("output_frequency") is None
     trend = tuple(
         TrendPoint(
             NOW - 60 + i / 2,
             (
-                way * min(50.0, max(0.0, i - 20) * 0.8),
-                2.0 + (i % 30) * 0.1,
-                way * (50.0 if i > 18 else 0.0),
+                way * min(50.0, max(0.0, i - 20) * 0.8) * (90 if raw else 1),
+                (2.0 + (i % 30) * 0.1) * (24 if raw else 1),
+                None if raw else way * (50.0 if i > 18 else 0.0),
             ),
+            MARKS.get(i, ""),
         )
         for i in range(120)
     )

@@ -94,6 +94,24 @@ async def test_trip_is_shown_in_the_status_bar_and_over_dialogs(key: str) -> Non
         assert made.bells == [None]  # type: ignore[attr-defined]
 
 
+async def test_reply_to_a_key_stays_on_its_screen_and_a_trip_does_not() -> None:
+    async with panel() as made:
+        made.app.events.add("done", "Wrote 3 parameters, all verified.", 1)
+        await made.until(lambda: "Wrote 3" in made.shown("said"))
+        await made.pilot.press("up")
+        await made.until(lambda: "Not armed" in made.shown("said"))
+        await made.on("3")
+        await made.until(lambda: "Wrote 3" in made.shown("said"))
+        assert "Not armed" not in made.shown("said")
+        await made.on("2")
+        await made.until(lambda: "Not armed" in made.shown("said"))
+        made.simulation.drive(1).provoke("ObF")
+        await made.until(lambda: "tripped: ObF" in made.shown("said"))
+        await made.on("3")
+        await made.pilot.pause(0.6)
+        assert "tripped: ObF" in made.shown("said")
+
+
 async def test_fault_is_new_until_faults_is_opened() -> None:
     async with panel() as made:
         made.simulation.drive(1).provoke("ObF")

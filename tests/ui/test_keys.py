@@ -361,7 +361,7 @@ SHOW_EVERYWHERE = {*"1234567", *"&é\"'(è", "/", "m", "I", "ctrl+p", "?", "f1",
 ARROWS = {"up", "down", "pageup", "pagedown"}
 SHOW = {
     "line": set(),
-    "monitor": {"tab", "<", ">"},
+    "monitor": {"tab", "<", ">", "=", "left", "right"},
     "opening": set(),
     "parameters": {
         *ARROWS, "home", "end", "tab", "right", "shift+tab", "left", "d", "D"

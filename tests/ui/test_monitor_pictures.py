@@ -95,6 +95,8 @@ SCENES = {
     "percent": Scene(PERCENT, family="atv21"),
     "word": Scene(fakes.RUNNING, keys=["tab"]),
     "window": Scene(fakes.RUNNING, keys=["<"]),
+    "ten-minutes": Scene(fakes.RUNNING, keys=[">", ">", ">"]),
+    "cursor": Scene(fakes.RUNNING, keys=["equals_sign", *["left"] * 36]),
     "run": Scene(fakes.READY, armed=57.0, reference=300, keys=["r"]),
     "run-at-zero": Scene(fakes.READY, armed=57.0, reference=0, keys=["r"]),
     "run-refused": Scene(fakes.READY, armed=57.0, reference=300, keys=["v", *"80", "enter"]),
@@ -133,7 +135,7 @@ def panel(
         app.fleet.alarms.take({2: snapshot.state}, watch.onsets.by_device)
         app.events.add("fault", "tripped: ObF Overbraking.", 2)
     elif scene.armed is not None:
-        app.events.add("told", "Armed for one minute.")
+        app.events.add("told", "Armed for one minute.", 2)
     fakes.choose(app, console)
 
     async def read(codes: list[str], **_: Any) -> Any:

@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import pytest
 
+from tui.bus.api import LastMinute
 from tui.drive.orders import MOVING_ORDERS
 from tui.drive.profile import library
 from tui.drive.profile.schema import Bit
 from tui.screens.command.control import Control, hindrance
-from tui.screens.monitor.assembly import NOTICE_ROWS, line_figures, notice_lines
+from tui.screens.monitor.assembly import NOTICE_ROWS, notice_lines
 from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
 from tui.screens.monitor.state import state_lines
@@ -23,6 +24,7 @@ from tui.screens.monitor.words import (
     word_pages,
 )
 from tui.session.timeout_report import TimeoutWatch
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STALE
 
 from . import fakes
 from .test_monitor_pictures import AT_TERMINALS, AT_ZERO, NO_SUPPLY, SPEEDING_UP
@@ -140,25 +142,25 @@ def test_word_line_omits_normal_bits() -> None:
     view = view_of(ATV71, {**fakes.RUNNING, "ETA": 0x0637})
     line = word_line(view, ATV71["ETA"], 79).plain
     assert line.split("16#0637")[1].strip() == (
-        "ready · switched on · enabled · power · at reference"
+        "● ready  ● switched on  ● enabled  ● power  ● at reference"
     )
 
 
 @pytest.mark.parametrize(
     ("family", "code", "raw", "words"),
     [
-        ("atv71", "ETA", 0x0217, "ready · switched on · enabled · power · quick stop active"),
-        ("atv71", "ETA", 0x0227, "ready · switched on · enabled · no power"),
-        ("atv71", "ETA", 0x0037, "ready · switched on · enabled · power · local"),
-        ("atv71", "ETA", 0x0250, "power · switch on disabled"),
-        ("atv312", "ETA", 0x0021, "ready · forced local"),
+        ("atv71", "ETA", 0x0217, "ready  ● switched on  ● enabled  ● power  ● quick stop active"),
+        ("atv71", "ETA", 0x0227, "ready  ● switched on  ● enabled  ● no power"),
+        ("atv71", "ETA", 0x0037, "ready  ● switched on  ● enabled  ● power  ● local"),
+        ("atv71", "ETA", 0x0250, "power  ● switch on disabled"),
+        ("atv312", "ETA", 0x0021, "ready  ● forced local"),
         (
             "atv312",
             "ETA",
             0x0207,
-            "ready · switched on · enabled · quick stop active · no forced local",
+            "ready  ● switched on  ● enabled  ● quick stop active  ● no forced local",
         ),
-        ("atv21", "FD01", 0x4000, "stop · standby"),
+        ("atv21", "FD01", 0x4000, "stop  ● standby"),
         ("powerdrive", "10.40", 0x0000, "not ready"),
     ],
 )
@@ -167,7 +169,7 @@ def test_word_line_lists_bits_that_are_true_at_0(
 ) -> None:
     profile = library.load(family)
     line = word_line(view_of(profile, {code: raw}), profile[code], 100).plain
-    assert line.split(f"16#{raw:04X}")[1].strip() == words
+    assert line.split(f"16#{raw:04X}")[1].strip() == f"● {words}"
 
 
 @pytest.mark.parametrize("family", PROFILES)
@@ -176,7 +178,7 @@ def test_word_line_lists_only_bits_lit_in_the_grid(family: str) -> None:
     for word in (parameter for parameter in profile.data.parameters if parameter.bits):
         for raw in (0x0000, 0x0027, 0x0207, 0xFFFF):
             view = view_of(profile, {word.code: raw})
-            listed = word_line(view, word, 2000).plain.count(" · ")
+            listed = word_line(view, word, 2000).plain.count("● ")
             lit = sum("●" in _bit_line(bit, raw, 60).plain for bit in word.bits)
             assert listed <= lit, (word.code, raw)
 
@@ -191,10 +193,26 @@ def test_bit_in_columns_has_its_subject() -> None:
     assert "In force" not in reported
 
 
-def test_empty_addresses_are_not_failures() -> None:
+def test_answers_of_the_last_minute_have_the_lower_edge() -> None:
     view = view_of(ATV71, fakes.RUNNING)
-    counters = replace(view.counters, timeouts=1, searched=17)
-    assert "1 failed" in line_figures(replace(view, counters=counters)).plain
+    for minute, text, style in (
+        (LastMinute(good=119, lost=1), "119/120 in 60 s", PLAIN),
+        (LastMinute(good=100, lost=5, damaged=15, silent=9), "100/120 in 60 s", ALARM),
+        (LastMinute(), "-----", FAINT),
+    ):
+        counters = replace(view.counters, timeouts=1, searched=17, minute=minute)
+        for shown in (view, replace(view, snapshot=fakes.snapshot_of(ATV71, fakes.FAULT))):
+            line = state_lines(replace(shown, counters=counters), 25)[-1]
+            assert line.plain.split(maxsplit=1) == ["Answers", text]
+            assert line.spans[-1].style == style
+
+
+def test_age_of_the_last_poll_is_beside_an_active_timeout() -> None:
+    view = replace(view_of(ATV71, fakes.RUNNING), watch=TimeoutWatch(10.0, None, active=True))
+    for heard, text in ((0.4, "<1 s"), (3.2, "3 s"), (9.0, "9 s")):
+        line = state_lines(replace(view, heard=fakes.NOW - heard), 25)[3]
+        assert line.plain == f"{'Timeout':<{25 - len(text) - 13}}10 s, polled {text}"
+        assert (line.spans[-1].style == STALE) == (heard == 9.0)
 
 
 def _drawn(bit: Bit, raw: int) -> tuple[str, bool]:

@@ -18,18 +18,17 @@ from tui.screens.frames.frame_view import frame_line
 from tui.screens.keys.action import CONNECTION, MONITOR
 from tui.screens.keys.screens import EVERYWHERE
 from tui.screens.keys.table import keys_line, screen_actions
-from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
+from tui.screens.monitor.arrange import OUTSIDE, WIDE, Arrangement, arrange
 from tui.screens.monitor.assembly import codes_beside, monitor_parts, watched_words
 from tui.screens.monitor.motor import motor_lines, other_values, value_cells
 from tui.screens.monitor.readouts import readout_lines
 from tui.screens.monitor.screen import order_keys
-from tui.screens.monitor.view import View, readout_parameter
-from tui.session.monitor.trend import TrendPoint
+from tui.screens.monitor.view import View
+from tui.session.monitor.trend import TrendPoint, readout_parameter
 from tui.session.shown import Quality
 from tui.widgets.drawing import key_line
 from tui.widgets.gauge import gauge
 from tui.widgets.palette import STOP_KEY
-from tui.widgets.trend import trend_rows
 
 from . import fakes
 
@@ -66,11 +65,11 @@ def any_raws(draw: st.DrawFn, profile: Profile) -> dict[str, int]:
     }
 
 
-SIZES = st.sampled_from([(40, 12), (60, 20), (80, 24), (100, 30), (120, 40), (200, 60)])
+SIZES = st.sampled_from([(60, 16), (60, 20), (80, 24), (100, 30), (120, 40), (200, 60)])
 
 
 def room_of(profile: Profile, size: tuple[int, int]) -> Arrangement:
-    return arrange(*size, len(other_values(profile)))
+    return arrange(*size, len(other_values(profile, wide=size[0] >= WIDE)))
 
 
 @pytest.mark.parametrize("profile_id", kept(PROFILES, "atv21", "atv71", "powerdrive"))
@@ -91,16 +90,29 @@ def test_every_part_keeps_its_size_and_its_width(profile_id: str, data: st.DataO
             assert line.cell_len <= room.width, (part, line.plain)
 
 
-@given(width=st.integers(20, 220), height=st.integers(5, 80), count=st.integers(0, 20))
+@given(width=st.integers(60, 220), height=st.integers(16, 80), count=st.integers(0, 20))
 def test_parts_fill_the_terminal_exactly(width: int, height: int, count: int) -> None:
     room = arrange(width, height, count)
-    rows = (room.top, room.values, room.trend, room.words, room.bottom)
-    assert min(rows) >= 0
-    assert sum(rows) <= max(1, height - OUTSIDE)
-    assert room.top >= min(5, height - OUTSIDE)
+    assert room.top + room.values + room.curve + room.bottom == height - OUTSIDE
+    assert room.top >= 5
+    assert room.bottom >= 1
+    band = room.band + 1 if room.band else 0
+    assert 1 + room.plot + band + room.axis == room.curve
+    assert room.plot >= 3
 
 
-@pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
+@pytest.mark.parametrize("family", PROFILES)
+@pytest.mark.parametrize(
+    ("size", "plot", "band"),
+    [((60, 16), 3, 0), ((80, 24), 9, 0), ((120, 40), 16, 5), ((200, 60), 30, 9)],
+)
+def test_curve_has_rows_enough(family: str, size: tuple[int, int], plot: int, band: int) -> None:
+    room = room_of(library.load(family), size)
+    assert room.plot >= plot
+    assert room.band >= band
+
+
+@pytest.mark.parametrize("size", [(60, 16), (60, 20), (80, 24), (120, 40), (200, 60)])
 @pytest.mark.parametrize("profile_id", PROFILES)
 def test_parts_have_their_given_rows(profile_id: str, size: tuple[int, int]) -> None:
     profile = library.load(profile_id)
@@ -109,9 +121,8 @@ def test_parts_have_their_given_rows(profile_id: str, size: tuple[int, int]) -> 
     assert len(parts["readouts"]) == room.top
     assert len(parts["state"]) == room.top
     assert len(parts["motor"]) == room.values
-    assert len(parts["trend"]) == room.trend
+    assert len(parts["curve"]) == room.curve
     assert len(parts["message"]) == room.bottom
-    assert max(len(parts[part]) for part in parts if part.startswith("word")) <= room.words
 
 
 @pytest.mark.parametrize("profile_id", kept(PROFILES, "atv21", "atv71", "powerdrive"))
@@ -123,11 +134,11 @@ def test_numbers_and_units_are_aligned(profile_id: str, data: st.DataObject) -> 
     room = room_of(profile, (80, 24))
     for _ in range(2):
         view = view_of(profile, data.draw(any_raws(profile)))
-        lines = motor_lines(view, 80, room.values - 1, room.columns)
-        cells = 78 // room.columns
+        lines = motor_lines(view, 80, room.values, room.columns)
+        cells = 79 // room.columns
         for line in lines:
             for column in range(room.columns):
-                part = line.plain[2 + column * cells : 2 + (column + 1) * cells]
+                part = line.plain[1 + column * cells : 1 + (column + 1) * cells]
                 end = value_cells(cells, any(v.high for v in other_values(profile))) - 4
                 assert not part.strip() or (part[end - 1] != " " and part[end] == " "), part
 
@@ -148,9 +159,11 @@ def test_large_digits_are_aligned_whatever_their_value() -> None:
     profile = library.load("atv71")
     found = set()
     for raw in (0, 5, 500, 5999, -500):
-        rows = readout_lines(view_of(profile, {**fakes.RUNNING, "RFR": raw}), 56)
-        found.add(rows[3].plain.index(" Hz"))
-        assert len({row.cell_len for row in rows}) == 1
+        rows = [
+            row.plain for row in readout_lines(view_of(profile, {**fakes.RUNNING, "RFR": raw}), 50)
+        ]
+        found.add((rows[0].index(" Hz"), rows[3].index("."), rows[4].index(" 60 ┘")))
+        assert {len(row) for row in rows} == {50}
     assert len(found) == 1
 
 
@@ -173,25 +186,6 @@ def test_bar_is_filled_from_zero_to_either_side() -> None:
     forward, reverse = gauge(30, 0, 60, 22).plain, gauge(-30, -60, 60, 22).plain
     assert forward == "├━━━━━━━━━━──────────┤"
     assert reverse == "├─────━━━━━┼─────────┤"
-
-
-@given(
-    st.lists(st.none() | st.floats(-500, 500), max_size=100),
-    st.integers(1, 12),
-    st.booleans(),
-)
-def test_trend_has_its_size_whatever_its_values(
-    points: list[float | None], height: int, signed: bool
-) -> None:
-    rows = trend_rows(points, points[::-1], 60.0, height, signed=signed)
-    assert [row.cell_len for row in rows] == [len(points)] * height
-
-
-def test_trend_shows_the_sign_and_a_line_for_the_reference() -> None:
-    up = [row.plain for row in trend_rows([0, 30, 60], [60, 60, 60], 60, 2)]
-    assert up == ["▔▔█", "▁██"]
-    down = [row.plain for row in trend_rows([0, -60, None], [-60, -60, 30], 60, 2, signed=True)]
-    assert down == ["▁ ─", "▁█ "]
 
 
 def keys_shown(screen: str, width: int, stops: str = "STOP") -> Text:
@@ -242,8 +236,9 @@ def test_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:
     reading = view.reading("RFR")
     assert reading is not None
     assert reading.quality is Quality.STALE
-    heading, *_ = readout_lines(view, 56)
-    assert "Output 7s old" in " ".join(heading.plain.split())
+    heading, *_ = readout_lines(view, 50)
+    assert heading.plain.startswith("┌ Output Hz ")
+    assert " 7s old ┐" in heading.plain
     row = motor_lines(view, 80, 3, 3)[0]
     assert "7s" in row.plain
     assert "rpm" not in row.plain

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -28,6 +30,7 @@ RUNS = DriveNow(
     reference="40.0",
     current="3.2",
     armed=56.4,
+    family="ATV71",
 )
 VIEW = StripView(drive=RUNS, faults=1, unseen=True, load=0.4, clock="14:02:11")
 
@@ -35,8 +38,25 @@ VIEW = StripView(drive=RUNS, faults=1, unseen=True, load=0.4, clock="14:02:11")
 def test_status_bar_fits_80_columns() -> None:
     line = strip_line(VIEW, 80)
     assert line.cell_len == 80
-    for part in ("MACHINE 4", "▶ FORWARD", "30.0 →  40.0 Hz", "3.2 A", "■ 1 fault", "ARMED 56 s"):
-        assert part in line.plain
+    assert (
+        line.plain
+        == " 2 MACHINE 4·ATV71 ▶ FORWARD      30.0 →  40.0 Hz   3.2 A        ■1  ARMED 56 s "
+    )
+
+
+@pytest.mark.parametrize("width", [80, 85, 86, 100, 120, 200])
+@pytest.mark.parametrize("name", ["", "MACHINE 4", "CONVEYOR WEST 12", "é" * 40])
+def test_the_model_is_shown_from_80_columns_beside_any_name(width: int, name: str) -> None:
+    line = strip_line(VIEW._replace(drive=RUNS._replace(name=name)), width).plain
+    assert "ATV71" in line.split("▶")[0]
+    assert not name or name[:3] in line
+
+
+def test_the_model_is_whole_if_there_is_room() -> None:
+    assert "MACHINE 4 · ATV71HU15M3 " in strip_line(VIEW, 120).plain
+    assert " 2 ATV71HU15M3 " in strip_line(VIEW._replace(drive=RUNS._replace(name="")), 80).plain
+    long = VIEW._replace(drive=RUNS._replace(name="CONVEYOR WEST 12"))
+    assert strip_line(long, 80).plain.startswith(" 2 CONVEYOR…·ATV71 ▶")
 
 
 def cells_before(text: str, part: str) -> int:
@@ -81,9 +101,9 @@ FOREIGN = ("foreign frames", "foreign", "")
     ("drive", "faults", "shown"),
     [
         (RUNS._replace(armed=None), 0, "▲ line 91 % good "),
-        (RUNS._replace(armed=None), 1, "▲ line 91 %  ■ 1 fault  "),
-        (RUNS, 0, "▲ line 91 %  ARMED 56 s "),
-        (RUNS, 1, " ■ 1 fault   ARMED 56 s "),
+        (RUNS._replace(armed=None), 1, "▲ 91 %  ■ 1 fault  "),
+        (RUNS, 0, "▲ 91 %  ARMED 56 s "),
+        (RUNS, 1, "▲ ■1  ARMED 56 s "),
         (RUNS._replace(armed=None, by="Terminals"), 0, "▲ 91 % by Terminals "),
         (None, 0, "▲ line 91 % 14:02:11 "),
         (None, 1, " ■ 1 fault  ▲ line 91 % 14:02:11 "),
@@ -158,19 +178,25 @@ def test_long_line_name_hides_no_note_about_the_line() -> None:
 @pytest.mark.parametrize("width", [60, 72, 79, 80, 120])
 @pytest.mark.parametrize("chosen", [tab.name for tab in TABBED])
 def test_every_tab_has_its_key_and_fits(width: int, chosen: str) -> None:
-    marks = {"parameters": ("●12", ATTENTION), "faults": ("■", FAULT), "line": ("■", FAULT)}
+    marks = {"parameters": ("●", ATTENTION), "faults": ("■", FAULT), "line": ("■", FAULT)}
     line = tabs_line(TABS, chosen, marks, width)
     assert line.cell_len <= width
     assert [tab.key for tab in TABS] == [tab.digit for tab in TABBED]
     for tab in TABS:
-        assert f"{tab.key} " in line.plain
+        assert f"{tab.key}{marks.get(tab.place, (' ',))[0]}{tab.name[0]}" in line.plain
     assert any(span.style == CURSOR for span in line.spans)
 
 
 def test_marks_move_no_tab() -> None:
     bare = tabs_line(TABS, MONITOR, {}, 80).plain
-    marked = tabs_line(TABS, MONITOR, {"parameters": ("●2", ATTENTION)}, 80).plain
-    assert bare.index("4 Scanner") == marked.index("4 Scanner")
+    marked = tabs_line(TABS, MONITOR, {"parameters": ("●", ATTENTION)}, 80).plain
+    assert marked == bare.replace("3 Parameters", "3●Parameters")
+
+
+@pytest.mark.parametrize(("width", "gap"), [(60, 3), (80, 2), (120, 4), (200, 4)])
+def test_tabs_are_evenly_spaced(width: int, gap: int) -> None:
+    line = tabs_line(TABS, MONITOR, {}, width).plain
+    assert re.findall(r"(?<=\w)( +)(?=\d)", line) == [" " * gap] * (len(TABS) - 1)
 
 
 @pytest.mark.parametrize("kind", ["refused", "done"])
@@ -206,7 +232,7 @@ def test_unwritable_journal_is_shown_and_moves_nothing(width: int, faults: int) 
     line = strip_line(StripView(drive=RUNS, faults=faults, off_record=True), width)
     assert line.cell_len == width
     assert ("NO JOURNAL" if width >= 72 else "J!") in line.plain
-    assert "ARM 56" in line.plain
+    assert re.search("ARM(ED)? 56", line.plain)
     for part in ("▶", " A "):
         assert cells_before(line.plain, part) == cells_before(before, part)
     assert "NO JOURNAL" in strip_line(StripView(line="sim:atv71", off_record=True), width).plain

@@ -35,7 +35,7 @@ from .keys.table import once_closed, stop_keys
 if TYPE_CHECKING:
     from .app_port import Panel
 
-TABS = tuple(Tab(tab.name, tab.digit, tab.title, tab.narrow, tab.mark_cells) for tab in TABBED)
+TABS = tuple(Tab(tab.name, tab.digit, tab.title, tab.narrow) for tab in TABBED)
 MESSAGE_KIND_STYLES: dict[str, Style] = {
     "fault": FAULT,
     "failed": FAULT,

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
+    from tui.session.events import Event
     from tui.session.fleet import Fleet
     from tui.session.monitor.look import Look
     from tui.session.shown import Shown
@@ -82,6 +83,8 @@ class FrameSource:
 
     def __init__(self, app: Panel) -> None:
         self._app = app
+        self._bound: tuple[Event | None, str] = (None, "")
+        """The newest event, and the screen on which it was first shown."""
         self._busy: tuple[float, float] | None = None
         self._load: float | None = None
 
@@ -146,7 +149,7 @@ class FrameSource:
         holds = self._line_trouble(now) or self._not_heard() or self._trouble_below(now)
         if holds:
             return BarMessage(self._app.clock.time_of_day(), holds, "alarm", 0.0)
-        event = self._app.events.newest
+        event = self._event()
         outcome = console.session.work.outcome if console is not None else None
         if outcome is not None and outcome.kind == "working":
             return BarMessage(
@@ -163,6 +166,20 @@ class FrameSource:
         if message is event and place == self._app.place:
             text = f"{text} {keys}".strip()  # on another screen they may mean something else
         return BarMessage(at(event.wall), text, event.kind, time.time() - event.wall, there)
+
+    def _event(self) -> Event | None:
+        """Return the newest event that concerns the screen on top; None without one.
+
+        A reply to a key or to a command that was refused stays on the screen where it was shown
+        first. On others the newest of the events before it is shown.
+        """
+        newest, place = self._app.events.newest, self._app.place
+        if newest is not self._bound[0]:
+            self._bound = newest, place
+        if newest is None or not _is_reply(newest) or place == self._bound[1]:
+            return newest
+        before = (event for event in reversed(self._app.events.events) if not _is_reply(event))
+        return next(before, None)
 
     def _trouble_below(self, now: float) -> str:
         """The first trouble of the lines that are open and not shown."""
@@ -203,6 +220,15 @@ class FrameSource:
         )
 
 
+REPLY_KINDS = frozenset({"told", "refused"})
+"""Kinds of events that reply to a key."""
+
+
+def _is_reply(event: Event) -> bool:
+    """True if an event only replies to a key on one screen; False if it is about a drive."""
+    return event.kind in REPLY_KINDS and (event.device is None or event.kind == "refused")
+
+
 def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
     """The open drive as it was last seen, by its monitor or by the line's look at it."""
     session, identity = console.session, console.identity
@@ -231,7 +257,13 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
         age=age,
         armed=armed if armed is None or math.isfinite(armed) else 99.0,
         by=_commanding(fleet, session.device) or _commanded_by(state),
+        family=_family(model, session.profile.id),
     )
+
+
+def _family(model: str, profile: str) -> str:
+    """Return the beginning of a model that is the name of its family; empty if it is not."""
+    return profile.upper() if model.upper().startswith(profile.upper()) else ""
 
 
 def _seen(
@@ -343,10 +375,10 @@ def _marks(console: DriveConsole | None, fleet: Fleet | None) -> dict[str, tuple
         return marks
     editor = console.begun_editor
     if editor is not None and len(editor.staging.edits):
-        marks[PARAMETERS] = (f"●{min(99, len(editor.staging.edits))}", ATTENTION)
+        marks[PARAMETERS] = ("●", ATTENTION)
     elif console.session.unsaved:
-        marks[PARAMETERS] = ("S", ALARM)
+        marks[PARAMETERS] = ("▲", ALARM)
     blocks = console.begun_blocks
-    if blocks is not None and (count := blocks.proposals.count):
-        marks[BLOCKS] = (f"●{count}", ATTENTION)
+    if blocks is not None and blocks.proposals.count:
+        marks[BLOCKS] = ("●", ATTENTION)
     return marks

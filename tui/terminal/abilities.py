@@ -33,6 +33,9 @@ NAMED_COLORS: tuple[tuple[str, ColorSystem], ...] = (
 )
 """Colors by a part of TERM if the system does not know that terminal."""
 
+WITHOUT_BRAILLE = ("linux", "cons25", "vt", "pcansi", "sco")
+"""Beginnings of TERM of consoles whose fonts have no braille."""
+
 LOCALE = ("LC_ALL", "LC_CTYPE", "LANG")
 """Variables with the encoding, the first that is set first."""
 
@@ -49,6 +52,8 @@ class Abilities(NamedTuple):
     """None where there are none, or none are wanted."""
     erases: bool = False
     """True if it erases cells in the color that is set."""
+    braille: bool = True
+    """True if its font has the dots of braille; those of text consoles have none."""
 
 
 EVERYTHING: Final = Abilities()
@@ -66,7 +71,8 @@ def abilities_of(
     encoding = encoding_of(environment, written_as)
     if ascii is not None:
         encoding = ASCII if ascii else UTF_8
-    return Abilities(encoding, _colors(environment, term, known), erases)
+    colors = _colors(environment, term, known)
+    return Abilities(encoding, colors, erases, braille=not term.startswith(WITHOUT_BRAILLE))
 
 
 def fewer_colors(abilities: Abilities) -> Abilities:

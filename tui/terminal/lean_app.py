@@ -57,6 +57,8 @@ class LeanApp(App[None]):
         self._colors = abilities.colors or ColorSystem.STANDARD
         self.plain_signs = abilities.encoding != UTF_8
         """True if the terminal has signs of ASCII only, or few more."""
+        self.has_braille = abilities.braille
+        """True if its font has the dots of braille."""
         self._instead = filters_for(abilities)
         self._picture = Picture(erases=abilities.erases)
         self._pacing = Pacing(slow=slow)

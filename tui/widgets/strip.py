@@ -6,7 +6,7 @@ Every part has its place, so that nothing moves when a value changes. Pure funct
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from rich.cells import cell_len
@@ -37,9 +37,9 @@ from .palette import (
 STATE_WIDTH = 14
 VALUES_WIDTH = 26
 """`123.4 → 123.4 Hz  123.4 A`, each at its place."""
-RIGHT_WIDTH, NARROW_RIGHT = 24, 13
+RIGHT_WIDTH, MIDDLE_RIGHT, NARROW_RIGHT = 24, 21, 13
 """Kept for the faults of the line and for ARMED, whether they are there or not."""
-NARROW, WIDE = 72, 100
+NARROW, MIDDLE, WIDE = 72, 86, 100
 """Columns below which these are short, and from which a trouble of the line has its own place."""
 LOAD_WIDTH = 12
 """Cells of the load of the line; on fewer than `WIDE` columns a trouble of the line is there."""
@@ -77,6 +77,8 @@ class DriveNow(NamedTuple):
     """Seconds for which it is armed yet."""
     by: str = ""
     """Its commander, if it is not this panel."""
+    family: str = ""
+    """Short form of its model; empty if there is none."""
 
 
 class StripView(NamedTuple):
@@ -129,17 +131,40 @@ def _line_text(line: str, room: int) -> str:
 
 
 def _drive(drive: DriveNow, width: int) -> Text:
-    """Return its identity, state and values; the name gets the room that the others leave."""
-    right = RIGHT_WIDTH if width >= NARROW else NARROW_RIGHT
-    room = max(4, min(NAME_WIDEST, width - STATE_WIDTH - VALUES_WIDTH - right))
+    """Return its identity, state and values; the identity gets the room that the others leave."""
+    room = max(4, min(NAME_WIDEST, width - STATE_WIDTH - VALUES_WIDTH - _right_width(width)))
     who = Text(no_wrap=True)
     who.append(f"{drive.device:>2} ", FAINT)
-    name, model = plain(drive.name), plain(drive.model)
-    who.append(name or model, STRONG)
-    if name and model and room - who.cell_len > 6:
-        who.append(f" · {model}", FAINT)
+    name, model = identity_in(drive, room - who.cell_len - 1)
+    who.append(name, STRONG).append(model, FAINT)
     who.truncate(room - 1, overflow="ellipsis", pad=True)
     return who.append(" ").append_text(_state(drive)).append_text(_values(drive))
+
+
+LEAST_NAME = 6
+"""Cells of a name that still identify its drive beside the model."""
+
+
+def identity_in(drive: DriveNow, room: int) -> tuple[str, str]:
+    """Return the name and the model in so many cells: a long model is short, then a long name."""
+    name, model = plain(drive.name), plain(drive.model)
+    if not name or not model:
+        return name or model, ""
+    family = plain(drive.family) or model
+    forms = (f" · {model}", f" · {family}", f"·{family}")
+    form = next((form for form in forms if cell_len(name + form) <= room), "")
+    if form:
+        return name, form
+    left = room - cell_len(forms[-1])
+    if left < LEAST_NAME:
+        return name, ""
+    while cell_len(name) >= left:
+        name = name[:-1]
+    return f"{name.rstrip()}…", forms[-1]
+
+
+def _right_width(width: int) -> int:
+    return NARROW_RIGHT if width < NARROW else MIDDLE_RIGHT if width < MIDDLE else RIGHT_WIDTH
 
 
 def _state(drive: DriveNow) -> Text:
@@ -170,26 +195,12 @@ def _values(drive: DriveNow) -> Text:
 
 def _right(view: StripView, width: int) -> Text:
     """Return the part on the whole line, and whether keys move this drive's motor."""
-    text, drive, narrow = Text(no_wrap=True), view.drive, width < NARROW
-    room = NARROW_RIGHT if narrow else RIGHT_WIDTH
-    off_record = "J!" if narrow and drive is not None else "NO JOURNAL "
-    narrow = narrow or view.off_record
-    if view.faults:
-        count = counted(view.faults, "■ 1 fault", "■ {count} faults")
-        count = f"■{view.faults}" if narrow else count
-        style = FAULT_BLOCK if view.unseen else FAULT
-        text.append(f" {count} " if view.unseen and not narrow else count, style)
-        text.append(" ")
-    if view.off_record:
-        text.append(off_record, ALARM)
-    if drive is not None and drive.armed is not None:
-        armed = Text(f" ARM {drive.armed:2.0f} ", ATTENTION_BLOCK) if narrow else None
-        text.append_text(armed or armed_text(drive.armed))
-    elif view.read_only:
-        text.append("read-only ", FAINT)
-    elif drive is not None and drive.by:
-        left = (NARROW_RIGHT if narrow else room) - text.cell_len - len("by  ")
-        text.append(f"by {short(drive.by, max(4, left))} ", FAINT)
+    drive, room = view.drive, _right_width(width)
+    # as much as has room, the shortest form in any case
+    forms = (_whole_line(view, room, level=level) for level in range(LEVELS_MOST + 1))
+    for text in forms:
+        if text.cell_len <= room:
+            break
     if drive is not None:
         return _trouble(view.trouble, room - text.cell_len).append_text(text)
     load = f"load {view.load * 100:3.0f} %  " if view.load is not None else ""
@@ -199,6 +210,31 @@ def _right(view: StripView, width: int) -> Text:
     trouble = _trouble(view.trouble, LOAD_WIDTH)
     text.append_text(trouble).append(" " * (LOAD_WIDTH - trouble.cell_len))
     return text.append(f"{view.clock} ", FAINT)
+
+
+LEVELS_MOST = 3
+"""Steps by which the part at the right shrinks: the faults, then ARMED, then the journal."""
+
+
+def _whole_line(view: StripView, room: int, *, level: int) -> Text:
+    """Return faults, a journal that cannot be written, and arming; at `level` 0 in full."""
+    text, drive = Text(no_wrap=True), view.drive
+    if view.faults:
+        count = counted(view.faults, "■ 1 fault", "■ {count} faults")
+        count = f"■{view.faults}" if level else f" {count} " if view.unseen else count
+        text.append(count, FAULT_BLOCK if view.unseen else FAULT).append(" ")
+    if view.off_record:
+        text.append("J!" if level >= LEVELS_MOST and drive is not None else "NO JOURNAL", ALARM)
+        text.append("" if level > 1 else " ")
+    if drive is not None and drive.armed is not None:
+        armed = Text(f" ARM {drive.armed:2.0f} ", ATTENTION_BLOCK) if level > 1 else None
+        text.append_text(armed or armed_text(drive.armed))
+    elif view.read_only:
+        text.append("read-only ", FAINT)
+    elif drive is not None and drive.by:
+        left = room - text.cell_len - len("by  ")
+        text.append(f"by {short(drive.by, max(4, left))} ", FAINT)
+    return text
 
 
 def _trouble(signs: Sequence[str], room: int) -> Text:
@@ -216,8 +252,6 @@ class Tab(NamedTuple):
     name: str
     narrow: str
     """Its name where the terminal is narrow."""
-    room: int = 0
-    """Cells kept for its mark."""
 
 
 def tabs_line(
@@ -230,25 +264,35 @@ def tabs_line(
 ) -> Text:
     """The second line: where the keys lead, what is there, and where we are.
 
+    A mark is one cell between the key and the name, so it moves nothing.
     Where the keys do not `lead` there now, as digits are typed, they are drawn dim.
     """
-    full = sum(len(tab.name) + tab.room + 3 for tab in tabs) + 1
-    wide = full <= width
-    text, block = Text(no_wrap=True), (0, 0)
+    names = {tab.place: tab.name for tab in tabs}
+    if (gap := tab_gap(names.values(), width)) < 1:
+        names = {tab.place: tab.narrow for tab in tabs}
+        gap = max(1, tab_gap(names.values(), width))
+    text, block = Text(" ", no_wrap=True), (0, 0)
     for tab in tabs:
         here, start = tab.place == chosen, text.cell_len
-        text.append(f" {tab.key}", STRONG if here and lead else KEY if lead else FAINT)
-        text.append(f" {tab.name if wide else tab.narrow}", STRONG if here else FAINT)
-        mark, style = marks.get(tab.place, ("", PLAIN))
-        text.append(f" {mark}" if mark and wide else mark, style)
-        if wide:
-            text.append(" " * max(0, start + len(tab.name) + 3 + tab.room - text.cell_len))
+        text.append(tab.key, STRONG if here and lead else KEY if lead else FAINT)
+        mark, style = marks.get(tab.place, (" ", PLAIN))
+        text.append(mark, style)
+        text.append(names[tab.place], STRONG if here else FAINT)
         if here:
-            text.append(" ")
-            block = (start, text.cell_len)
+            block = (start - 1, text.cell_len + 1)
+        text.append(" " * gap)
     text.stylize(CURSOR, *block)
     text.truncate(width)
     return text
+
+
+TAB_GAP_MOST = 4
+
+
+def tab_gap(names: Collection[str], width: int) -> int:
+    """Return the cells between two tabs, the same for all; below 1 if there is no room."""
+    cells = sum(len(name) + 2 for name in names)
+    return min(TAB_GAP_MOST, (width - 2 - cells) // max(1, len(names) - 1))
 
 
 def message_line(when: str, message: str, style: Style, hint: str, width: int) -> Text:

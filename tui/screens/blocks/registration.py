@@ -25,7 +25,6 @@ REGISTERED = (
         about="indirect blocks, or the communication scanner",
         digit="4",
         narrow="Scan",
-        mark_cells=3,
         create=create_blocks,
         actions=(
             *ARMING,

@@ -12,7 +12,6 @@ REGISTERED = (
         about="lines, and the drives that answer on one",
         digit="1",
         narrow="Line",
-        mark_cells=2,
         actions=key_rows(
             ("open_chosen", "enter", "open", "Open the line or drive under the cursor."),
             ("scan", "s", "scan", "Scan the addresses for drives; drives already found stay."),

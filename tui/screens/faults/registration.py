@@ -26,7 +26,6 @@ REGISTERED = (
         " the seconds before a trip",
         digit="5",
         narrow="Flt",
-        mark_cells=3,
         create=create_faults,
         actions=(
             *ARMING,

@@ -11,8 +11,9 @@ from tui.session.counters.compare import Comparison, TurnaroundBar, bars
 from tui.session.counters.watch import CountersNow
 from tui.widgets.drawing import cut_at_word, rule, short, wrapped
 from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNING, STRONG
-from tui.widgets.trend import EIGHTHS
 
+EIGHTHS = " ▁▂▃▄▅▆▇█"
+"""Bars of so many eighths of a row."""
 LEFT = 42
 """Columns of our counts; those of the drive are beside them."""
 BAR_WIDTH = 7

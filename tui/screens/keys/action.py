@@ -37,7 +37,7 @@ SHOWING = frozenset(
     {
         *("goto", "find", "messages", "wiring", "command_palette", "help", "redraw"),
         *("move", "page", "end", "group", "scroll", "section", "move_record", "filter"),
-        *("other_page", "other_table", "next_word", "trend_window"),
+        *("other_page", "other_table", "next_word", "trend_window", "cursor", "move_cursor"),
     }
 )
 """Actions that move a cursor or show something, and do nothing else: their keys act at once.
@@ -116,8 +116,6 @@ class Registration(NamedTuple):
     """The key of the panel that opens it, if it has no digit."""
     narrow: str = ""
     """Its name in a tab of a narrow terminal."""
-    mark_cells: int = 0
-    """Cells of its tab for a mark, such as the number of staged values."""
     create: Callable[[DriveConsole], Screen[None]] | None = None
     """Creates the screen on a drive; imports it when called."""
     refusal: Callable[[DriveConsole], str] = lambda console: ""

@@ -7,77 +7,84 @@ from dataclasses import dataclass
 OUTSIDE = 4
 """Rows of the frame: strip, tabs, message, keys."""
 READOUT_ROWS = 5
-"""A heading, three rows of digits, a bar."""
-BIG_WIDTH = 56
-"""Columns below which the readouts are plain lines."""
-WIDE_WORDS = (110, 36)
-"""Columns and rows from which all words are side by side."""
-ROOMY = 18
-"""Rows between the tabs and the message from which empty lines keep the parts apart."""
-VALUE_COLUMN = 25
+"""The upper edge with the name, three rows of digits, the lower edge with a bar."""
+ROOMY, VERY_ROOMY = 18, 30
+"""Rows between tabs and message from which words have two rows, and from which values have more."""
+WIDE = 110
+"""Columns from which there is a third readout, and tables of bits are side by side."""
+VALUE_COLUMN, WIDE_VALUE_COLUMN = 19, 26
 """Cells of a value: its name, its number, its unit."""
-VALUE_COLUMNS_MOST = 4
-VALUE_ROWS = 3
-"""Rows of values that most drives have."""
-WORD_ROWS = 16
-"""A heading, and as many bits as the words of the drives in hand have at most."""
-WORD_WIDTH = 29
-TREND_LEAST = 4
-"""A heading or an empty line, two rows, the axis."""
-STATE_BLOCK_WIDTH = 22
+VALUE_ROWS_MOST = 3
+STATE_WIDTH, STATE_WIDTH_MOST = 29, 44
+AXIS_ROWS, SHORT_AXIS_ROWS = 2, 1
+"""Rows below the curve: marks and clock times, which share one row if there are few."""
+SHORT_CURVE = 6
+"""Rows of the part of the curve up to which its axis is short."""
+BAND_FROM = 14
+"""Rows of curves from which the current has a band of its own."""
+BAND_LEAST, BAND_MOST = 3, 10
 
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """Rows of the parts, from the top, their empty lines included."""
+    """Rows of the parts, from the top."""
 
     width: int
     height: int
-    wide: bool
-    """True if words are side by side below the trends of frequency and current."""
-    big: bool
-    """True if the readouts are large."""
     top: int
     values: int
     columns: int
-    trend: int
-    words: int
+    """Columns of values."""
+    curve: int
+    """The curve with its heading and axis, or a table in its place."""
     bottom: int
 
     @property
+    def wide(self) -> bool:
+        """True if there is a third readout, and tables of bits are side by side."""
+        return self.width >= WIDE
+
+    @property
     def lead(self) -> int:
-        """Empty lines above the readouts and above each other part."""
-        return int(self.height - OUTSIDE >= ROOMY)
+        """Empty lines above the readouts."""
+        return self.top - READOUT_ROWS
 
     @property
     def state_width(self) -> int:
         """Columns of the block at the right."""
-        return STATE_BLOCK_WIDTH if self.width < 100 else min(60, self.width // 3)
+        return STATE_WIDTH if self.width < 100 else min(STATE_WIDTH_MOST, self.width * 2 // 7)
+
+    @property
+    def axis(self) -> int:
+        """Rows of the axis."""
+        return SHORT_AXIS_ROWS if self.curve <= SHORT_CURVE else AXIS_ROWS
+
+    @property
+    def band(self) -> int:
+        """Rows of the band of the current, without the line above it; 0 for none."""
+        rows = self.curve - 1 - self.axis
+        return max(BAND_LEAST, min(BAND_MOST, rows // 4)) if rows >= BAND_FROM else 0
+
+    @property
+    def plot(self) -> int:
+        """Rows of the first curve."""
+        band = self.band
+        return self.curve - 1 - self.axis - (band + 1 if band else 0)
 
 
 def arrange(width: int, height: int, count: int) -> Arrangement:
     """The parts in a terminal of that size, for a drive with so many values.
 
-    What there is no room for gets no rows: first the trend, then words, then values. The
-    readouts and the state stay.
+    The curve gets the rows that the others leave.
     """
-    room = max(1, height - OUTSIDE)
-    wide = width >= WIDE_WORDS[0] and height >= WIDE_WORDS[1]
-    lead = int(room >= ROOMY)
-    columns = max(1, min(VALUE_COLUMNS_MOST, (width - 2) // VALUE_COLUMN))
-    if wide:
-        columns = 3
-    if count <= 2 * VALUE_ROWS:
-        columns = min(columns, 2)  # room for whole names
-    big = width >= BIG_WIDTH and room >= READOUT_ROWS
-    top = min(room, READOUT_ROWS + lead)
-    bottom = min(room - top, 2 if wide else 3 + lead)
-    rest = room - top - bottom
-    words = WORD_ROWS + lead if wide else 0
-    rest -= words
-    rows = -(-count // columns)
-    values = min(rest, rows + int(rest > rows))
-    trend = rest - values
-    if trend < TREND_LEAST:
-        trend, bottom = 0, bottom + trend
-    return Arrangement(width, height, wide, big, top, values, columns, trend, words, bottom)
+    room = height - OUTSIDE
+    very = room >= VERY_ROOMY
+    columns = max(1, width // (VALUE_COLUMN if width < WIDE else WIDE_VALUE_COLUMN))
+    values = min(
+        -(-count // columns), 1 if room < ROOMY + 4 else 2 if room < 40 else VALUE_ROWS_MOST
+    )
+    if -(-count // max(1, values)) < columns:
+        columns = max(1, -(-count // max(1, values)))  # room for whole names
+    top = READOUT_ROWS + int(very)
+    bottom = 1 + int(room >= ROOMY) + int(very)
+    return Arrangement(width, height, top, values, columns, room - top - values - bottom, bottom)

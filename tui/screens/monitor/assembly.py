@@ -8,14 +8,14 @@ from rich.text import Text
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
-from tui.widgets.drawing import wrapped
-from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN
+from tui.widgets.drawing import rule, wrapped
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, PLAIN
 
-from .arrange import WORD_WIDTH, Arrangement
-from .motor import motor_lines
-from .readouts import plain_lines, readout_lines
+from .arrange import WIDE_VALUE_COLUMN, Arrangement
+from .curves import curve_lines
+from .motor import motor_lines, other_values
+from .readouts import framed, readout_lines
 from .state import state_lines
-from .trends import trend_lines
 from .view import View
 from .words import (
     WordPage,
@@ -23,6 +23,7 @@ from .words import (
     bit_columns,
     bit_grid,
     bit_lines,
+    has_alarm,
     shown_words,
     word_line,
     word_pages,
@@ -51,103 +52,102 @@ def notice_lines(view: View, width: int) -> list[Text]:
 
 
 def line_figures(view: View) -> Text:
-    """Return the read rate of the drive and the line's share of good replies."""
+    """Return the read rate of the drive, and the block that returns its values."""
     rate = view.snapshot.rate if view.snapshot and not view.lost else 0.0
     wished = 1 / view.period
     held = rate > HELD * wished or not rate
     text = Text(f"{rate:.1f} of {wished:.1f} cycles/s", FAINT if held else ALARM, no_wrap=True)
     if view.snapshot is not None and view.snapshot.block:
         text.append(f" by {view.snapshot.block.lower()}", FAINT)
-    counts = view.counters
-    failed = counts.timeouts + counts.checksum + counts.wrong
-    return text.append(f", {counts.requests} requests, {failed} failed ", FAINT)
+    return text.append(" ")
 
 
 Parts = dict[str, list[Text]]
-WORDS_MOST = 6
+WORD_WIDTH = 30
+"""Least cells of a table of bits beside another."""
+NEXT_CELLS = 12
+WordTable = tuple[WordPage, ...]
+"""Words that Tab shows together, with all their bits; no word stands for the values."""
 
 
 def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
     """Return the lines of each place, in exactly its number of rows."""
     lead = [Text("")] * room.lead
-    big = room.width - room.state_width - 2
-    state = state_lines(view, room.state_width)
-    if room.big:
-        parts = {"readouts": lead + readout_lines(view, big), "state": lead + state}
-    else:
-        both = [Text(f" {line.plain}", line.style) if not line.spans else line for line in state]
-        parts = {"readouts": plain_lines(view, room.width)[: room.top], "state": both}
-    gap = [Text("")] * int(room.values > 1)
-    rows = max(0, room.values - len(gap))
-    parts["motor"] = gap + (motor_lines(view, room.width, rows, room.columns) if rows else [])
-    parts["trend"] = _trend_or_word(view, room, words)
-    parts["message"] = bottom_lines(view, room, words)
-    return parts | _side_by_side(view, room, words)
+    readouts = readout_lines(view, room.width - room.state_width - 1, wide=room.wide)
+    return {
+        "readouts": lead + readouts,
+        "state": lead + framed_state(view, room.state_width),
+        "motor": motor_lines(view, room.width, room.values, room.columns, wide=room.wide),
+        "curve": curve_or_table(view, room, words),
+        "message": bottom_lines(view, room, words),
+    }
 
 
-def word_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
-    """Return the parts that change with the chosen word: the words side by side, or the trend's
-    place."""
-    if room.wide:
-        return _side_by_side(view, room, words)
-    return {"trend": _trend_or_word(view, room, words)}
+def framed_state(view: View, width: int) -> list[Text]:
+    """The state with who commands, in a frame; the line's answers are in its lower edge."""
+    head, *rows = state_lines(view, width - 4)
+    title = Text(" State ", FAINT)
+    right = Text(" ").append_text(head).append(" ")
+    padded = [Text(" ").append_text(row).append(" ") for row in rows]
+    return framed(title, right, padded[:3], padded[3], width)
 
 
-def _trend_or_word(view: View, room: Arrangement, words: Sequence[Parameter]) -> list[Text]:
-    """The trend, or in its place the chosen word with all its bits."""
-    if not room.trend:
-        return []
-    page = None if room.wide else chosen_page(view, room, words)
-    if page is None:
-        return [Text(""), *trend_lines(view, room.width - 1, room.trend - 1)]
-    return bit_grid(view, page, room.width - 1, room.trend)
+def curve_or_table(view: View, room: Arrangement, words: Sequence[Parameter]) -> list[Text]:
+    """The curve, or in its place all values, or words with all their bits."""
+    found = tables(view.profile, room, words)
+    if view.word is None or view.word >= len(found):
+        return curve_lines(view, room)
+    return _table_lines(view, room, found[view.word])
 
 
-def pages_in(room: Arrangement, words: Sequence[Parameter]) -> list[WordPage]:
-    """The words in pages as large as the place of the trend."""
-    return word_pages(words, bit_columns(room.width - 1) * max(1, room.trend - 1))
+def tables(profile: Profile, room: Arrangement, words: Sequence[Parameter]) -> list[WordTable]:
+    """Return the tables that Tab shows one after the other."""
+    values = other_values(profile, wide=room.wide)
+    found: list[WordTable] = [()] if len(values) > room.values * room.columns else []
+    if not room.wide:
+        most = bit_columns(room.width - 1) * (room.curve - 1)
+        return found + [(page,) for page in word_pages(words, most)]
+    pages, many = word_pages(words, room.curve - 1), room.width // WORD_WIDTH
+    return found + [tuple(pages[at : at + many]) for at in range(0, len(pages), many)]
 
 
-def chosen_page(view: View, room: Arrangement, words: Sequence[Parameter]) -> WordPage | None:
-    """The page that is shown in place of the trend; behind the last one comes the trend."""
-    pages = pages_in(room, words)
-    if view.word is None or not pages:
-        return None
-    at = view.word % (len(pages) + 1)
-    return pages[at] if at < len(pages) else None
+def _table_lines(view: View, room: Arrangement, table: WordTable) -> list[Text]:
+    """A table in exactly the rows of the curve."""
+    width = room.width - 1
+    following = Text.assemble(("  Tab", KEY), (" next", FAINT))
+    if not table:
+        columns = max(1, width // WIDE_VALUE_COLUMN)
+        rows = -(-len(other_values(view.profile, wide=room.wide)) // columns)
+        heading = Text(" ").append_text(rule("All values", width - NEXT_CELLS))
+        lines = motor_lines(view, width, min(rows, room.curve - 1), columns, wide=room.wide)
+        rest = [Text("")] * (room.curve - 1 - len(lines))
+        return [heading.append_text(following), *lines, *rest]
+    if len(table) == 1 and not room.wide:
+        return bit_grid(view, table[0], width, room.curve)
+    cells = width // len(table) - 1
+    parts = [bit_lines(view, page, cells) for page in table]
+    lines = [Text(no_wrap=True) for _ in range(room.curve)]
+    for part in parts:
+        for line, row in zip(lines, [*part, *[Text("")] * room.curve], strict=False):
+            line.append_text(row).append(" " * (cells + 1 - row.cell_len))
+    return lines
 
 
 def bottom_lines(view: View, room: Arrangement, words: Sequence[Parameter]) -> list[Text]:
-    """Notices, words in a line each, the alarms; what is lowest is dropped last."""
-    if not room.bottom:
-        return []
+    """Notices, the lit bits of a word or two, the alarms; what is lowest is dropped last.
+
+    A notice that needs more rows gets them.
+    """
     notices = notice_lines(view, room.width)
-    last = alarm_line(view, room.width, tab=bool(words) and not room.wide and room.trend > 0)
-    if room.wide:
-        figures = line_figures(view)
-        last = alarm_line(view, room.width - figures.cell_len - 1, tab=False)
-        last.append(" ")
-        last.append_text(figures)
-        lines = notices
-    else:
-        lines = [*notices, *(word_line(view, word, room.width - 1) for word in shown_words(words))]
-    space = room.bottom - 1
-    lines = lines[:space]
-    return [*[Text("")] * (space - len(lines)), *lines, last]
-
-
-def _side_by_side(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
-    """As many words as there is room for, with all their bits, from the chosen one on."""
-    parts: Parts = {f"word{index}": [] for index in range(WORDS_MOST)}
-    if not room.words:
-        return parts
-    lead = [Text("")] * room.lead
-    pages = word_pages(words, room.words - room.lead - 1)
-    many = min(WORDS_MOST, room.width // (WORD_WIDTH + 1))
-    for index in range(min(many, len(pages))):
-        page = pages[((view.word or 0) + index) % len(pages)]
-        parts[f"word{index}"] = [*lead, *bit_lines(view, page, room.width // many - 1)]
-    return parts
+    figures = line_figures(view) if room.wide else Text("")
+    last = alarm_line(view, room.width - figures.cell_len - 1, tab=True)
+    last.append(" ").append_text(figures)
+    texts = notices + [word_line(view, word, room.width - 1) for word in shown_words(words)]
+    if room.bottom == 1:
+        return notices or ([last] if has_alarm(view) or not texts else texts[:1])
+    space = max(room.bottom - 1, len(notices))
+    texts = texts[:space]
+    return [*texts, *[Text("")] * (space - len(texts)), last]
 
 
 def watched_words(profile: Profile) -> list[Parameter]:

@@ -8,14 +8,16 @@ from functools import lru_cache
 from rich.text import Text
 
 from tui.drive.profile.profile import Profile, is_verified, mark_of
-from tui.drive.profile.schema import MonitoringValue, Quantity
+from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
+from tui.session.monitor.trend import readout_parameter
 from tui.session.shown import Quality
 from tui.widgets.drawing import short
 from tui.widgets.gauge import gauge
 from tui.widgets.palette import FAINT, STALE, STRONG, age_text
 
-from .view import View, end_of, readout_parameter
+from .readouts import readout_quantities
+from .view import View, end_of
 
 LABELS: dict[Quantity, str] = {
     "ramp_output": "After ramp",
@@ -34,29 +36,43 @@ LABELS: dict[Quantity, str] = {
     "run_hours": "Run time",
     "power_on_hours": "Power-on time",
 }
+SHORT_LABELS: dict[Quantity, str] = {
+    "ramp_output": "Ramped",
+    "motor_voltage": "Motor",
+    "mains_voltage": "Mains",
+    "input_power": "Input",
+    "drive_thermal": "Drive th",
+    "motor_thermal": "Motor th",
+    "motor_load": "Load",
+    "drive_load": "Drive ld",
+    "run_hours": "Run time",
+    "power_on_hours": "On time",
+}
+"""Labels for narrow columns."""
 IN_READOUTS: frozenset[Quantity] = frozenset(
     {"output_frequency", "frequency_reference", "motor_current"}
 )
-UNIT_CELLS, NUMBER_CELLS = 3, 7
+UNIT_CELLS, NUMBER_CELLS, SHORT_NUMBER_CELLS = 3, 7, 6
+SHORT_FROM = 22
+"""Cells of a column below which labels and numbers are short."""
 VALUE_CELLS = 24
 """Cells of a value beside its bar."""
 VALUE_CELLS_MOST = 30
 BAR_CELLS, END_CELLS = 8, 4
-NO_ROOM = "on 3"
-"""Hint at what does not fit."""
 
 
-@lru_cache(maxsize=8)
-def other_values(profile: Profile) -> Sequence[MonitoringValue]:
+@lru_cache(maxsize=16)
+def other_values(profile: Profile, *, wide: bool = False) -> Sequence[MonitoringValue]:
     """The values beside the readouts, in the profile's order."""
-    return tuple(value for value in profile.data.monitoring.values if _is_other(profile, value))
+    found = (readout_parameter(profile, q) for q in readout_quantities(profile, wide=wide))
+    shown = {parameter.code for parameter in found if parameter is not None}
+    values = profile.data.monitoring.values
+    return tuple(v for v in values if v.parameter not in shown and _is_other(profile, v))
 
 
 def _is_other(profile: Profile, value: MonitoringValue) -> bool:
     parameter = profile[value.parameter]
-    shown = (readout_parameter(profile, "output_frequency"),
-             readout_parameter(profile, "motor_current"))  # fmt: skip
-    if parameter in shown or parameter.quantity in IN_READOUTS:
+    if parameter.quantity in IN_READOUTS:
         return False
     if parameter.quantity in LABELS:
         return True
@@ -67,21 +83,17 @@ def _is_other(profile: Profile, value: MonitoringValue) -> bool:
     )
 
 
-def motor_lines(view: View, width: int, rows: int, columns: int) -> list[Text]:
-    """The values column by column; what does not fit is counted, with where it is read."""
-    values = other_values(view.profile)
-    room = rows * columns
-    hidden = len(values) - room + 1 if len(values) > room else 0
-    cells = (width - 2) // columns
+def motor_lines(
+    view: View, width: int, rows: int, columns: int, *, wide: bool = False
+) -> list[Text]:
+    """The values row by row, as many as fit; the table on Tab has the others."""
+    values = other_values(view.profile, wide=wide)[: rows * columns]
+    cells = (width - 1) // columns
     barred = any(value.high for value in values)
-    places = [_value(view, value, cells, barred) for value in values[: room - bool(hidden)]]
-    if hidden and room:
-        places.append(Text(short(f"{hidden} more values {NO_ROOM}", cells - 1), FAINT))
-    lines = [Text("  ", no_wrap=True) for _ in range(rows)]
-    for at, place in enumerate(places):
-        line = lines[at % rows]
-        line.append_text(place)
-        line.append(" " * (cells - place.cell_len))
+    lines = [Text(" ", no_wrap=True) for _ in range(rows)]
+    for at, value in enumerate(values):
+        place = _value(view, value, cells, barred)
+        lines[at % rows].append_text(place).append(" " * (cells - place.cell_len))
     return lines
 
 
@@ -96,13 +108,15 @@ def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text
     parameter = view.profile[value.parameter]
     columns = value_cells(cells, barred)
     mark = f" {mark_of(view.profile, parameter)}".rstrip()
-    name = LABELS.get(parameter.quantity) if parameter.quantity else None
-    room = columns - NUMBER_CELLS - UNIT_CELLS - 1
-    label = short(name or parameter.name, room - len(mark)) + mark
+    is_short = cells < SHORT_FROM
+    numbers = SHORT_NUMBER_CELLS if is_short else NUMBER_CELLS
+    name = _label(parameter, is_short=is_short)
+    room = columns - numbers - UNIT_CELLS - 1
+    label = short(name, room - len(mark)) + mark
     text = Text(f"{label:<{room}}", FAINT, no_wrap=True)
     reading = view.reading(value.parameter)
     if reading is None or reading.raw is None:
-        text.append(f"{NOT_AVAILABLE:>{NUMBER_CELLS}}", FAINT)
+        text.append(f"{NOT_AVAILABLE:>{numbers}}", FAINT)
         return text.append(f" {short(parameter.unit or 'raw', UNIT_CELLS):<{UNIT_CELLS}}", FAINT)
     number, unit = reading.drawn(
         view.now,
@@ -110,7 +124,7 @@ def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text
         old=lambda held, age: ((held.text, FAINT), (age_text(age), STALE)),
         missing=((NOT_AVAILABLE, FAINT), (age_text(reading.age(view.now)), STALE)),
     )
-    text.append(f"{short(number[0], NUMBER_CELLS):>{NUMBER_CELLS}}", number[1])
+    text.append(f"{short(number[0], numbers):>{numbers}}", number[1])
     text.append(f" {short(unit[0], UNIT_CELLS):<{UNIT_CELLS}}", unit[1])
     high = end_of(view, value.high)
     if (
@@ -123,3 +137,11 @@ def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text
         text.append_text(gauge(reading.current_number, low, high, BAR_CELLS))
         text.append(short(f"{high:g}", END_CELLS), FAINT)
     return text
+
+
+def _label(parameter: Parameter, *, is_short: bool) -> str:
+    """The name of a value."""
+    if parameter.quantity is None:
+        return parameter.name
+    full = LABELS.get(parameter.quantity, parameter.name)
+    return SHORT_LABELS.get(parameter.quantity, full) if is_short else full

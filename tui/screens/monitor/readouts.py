@@ -1,76 +1,115 @@
-"""The two large readouts, output frequency and motor current, each with a bar; pure functions."""
+"""The large readouts: output frequency, motor current, and one more if there is room.
+
+Each is framed, with its name and unit, its extremes on the page of the curve, and a bar. Pure
+functions of a view.
+"""
 
 from __future__ import annotations
 
-from decimal import Decimal
+from collections.abc import Sequence
+from functools import lru_cache
 
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.profile.profile import mark_of
+from tui.drive.profile.profile import Profile, mark_of
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.drive.values import NOT_AVAILABLE, Value, decimals_of
+from tui.drive.values import NOT_AVAILABLE, Value
+from tui.session.monitor.trend import TREND_QUANTITIES, readout_parameter
 from tui.session.shown import Quality, Shown
-from tui.widgets.drawing import cut, short
+from tui.widgets.drawing import short
 from tui.widgets.gauge import gauge
-from tui.widgets.palette import BAR, BAR_REST, FAINT, STALE, STRONG, age_text
+from tui.widgets.palette import BAR, BAR_REST, FAINT, LINE, PLAIN, STALE, STRONG, age_text
 from tui.widgets.readout import ROWS, big, dashes, readout_cells
 
-from .view import View, bar_number, directed, end_of, readout_parameter
+from .curves import bar_end, points_of_page, span_text
+from .view import View, bar_number, decimal_places, directed, end_of
 
-READOUT_SHARE = 0.55
-"""Share of the width that the frequency has, for its sign."""
-READOUT_MOST = 104
-END_CELLS = 7
-"""Cells behind a bar for the number at its end."""
-TITLES: dict[Quantity, str] = {"output_frequency": "Output", "motor_current": "Current"}
+SIGN_CELLS = 5
+"""Cells that the frequency has more than the others, for its sign and a third digit."""
+SIDE_CELLS = 9
+"""Cells of the extremes beside the digits: a name and a number."""
+READOUT_MOST = 60
+TITLES: dict[Quantity, str] = {
+    "output_frequency": "Output",
+    "motor_current": "Current",
+    "torque": "Torque",
+    "power": "Power",
+    "motor_load": "Motor load",
+}
+THIRD: Sequence[Quantity] = ("torque", "power", "motor_load")
+"""Quantities of the third readout, the first that the drive has."""
 
 
-def readout_lines(view: View, width: int) -> list[Text]:
-    """Both side by side: a heading, three rows of digits, a bar."""
-    width = min(width, READOUT_MOST)
-    margin = 2 if width >= 54 else 1
-    left = round((width - margin) * READOUT_SHARE)
-    rows = [Text(" " * margin, no_wrap=True) for _ in range(ROWS + 2)]
-    for quantity, cells in zip(TITLES, (left, width - margin - left), strict=True):
-        for row, part in zip(rows, _readout(view, quantity, cells), strict=True):
+@lru_cache(maxsize=16)
+def readout_quantities(profile: Profile, *, wide: bool) -> tuple[Quantity, ...]:
+    """Return the quantities that have a large readout."""
+    found: list[Quantity] = ["output_frequency", "motor_current"]
+    watched = {value.parameter for value in profile.data.monitoring.values}
+    if wide:
+        for quantity in THIRD:
+            parameter = profile.quantity(quantity)
+            if parameter is not None and parameter.code in watched:
+                return (*found, quantity)
+    return tuple(found)
+
+
+def readout_lines(view: View, width: int, *, wide: bool = False) -> list[Text]:
+    """The readouts side by side, each row of exactly so many cells."""
+    quantities = readout_quantities(view.profile, wide=wide)
+    cells = (width - len(quantities) + 1 - SIGN_CELLS) // len(quantities)
+    rows = [Text(no_wrap=True) for _ in range(ROWS + 2)]
+    for number, quantity in enumerate(quantities):
+        more = SIGN_CELLS if number == 0 else 0
+        parts = _readout(view, quantity, min(READOUT_MOST, cells + more))
+        for row, part in zip(rows, parts, strict=True):
+            row.append(" " if number else "")
             row.append_text(part)
+    for row in rows:
+        row.append(" " * (width - row.cell_len))
     return rows
 
 
-def plain_lines(view: View, width: int) -> list[Text]:
-    """The same two as plain lines, where there is no room for large ones."""
-    lines = []
-    for quantity, title in TITLES.items():
-        parameter = readout_parameter(view.profile, quantity)
-        text, unit, style = _shown(view, quantity, parameter)
-        line = Text(f" {title:<8}", FAINT, no_wrap=True)
-        line.append(f"{text:>8}", style)
-        line.append(f" {unit}", FAINT)
-        lines.append(line)
-    for line in lines:
-        line.truncate(width)
-    return lines
+def framed(title: Text, right: Text, rows: Sequence[Text], bottom: Text, cells: int) -> list[Text]:
+    """Rows in a frame of exactly so many cells, with texts in its upper and lower edge."""
+    inner = cells - 2
+    title = title.copy()
+    title.truncate(inner)
+    if title.cell_len + right.cell_len > inner:
+        right = Text()
+    top = Text("┌", LINE, no_wrap=True).append_text(title)
+    top.append("─" * (inner - title.cell_len - right.cell_len), LINE)
+    lines = [top.append_text(right).append("┐", LINE)]
+    for row in rows:
+        line = Text("│", LINE, no_wrap=True).append_text(_filled(row, inner, " "))
+        lines.append(line.append("│", LINE))
+    lower = Text("└", LINE, no_wrap=True).append_text(_filled(bottom, inner, "─"))
+    return [*lines, lower.append("┘", LINE)]
+
+
+def _filled(row: Text, cells: int, character: str) -> Text:
+    row = row.copy()
+    row.truncate(cells)
+    return row.append(character * (cells - row.cell_len), LINE)
 
 
 def _readout(view: View, quantity: Quantity, cells: int) -> list[Text]:
-    """One of them, each row of exactly so many cells."""
+    """One readout, each row of exactly so many cells."""
     parameter = readout_parameter(view.profile, quantity)
     text, unit, style = _shown(view, quantity, parameter)
-    unit = short(unit, 4)
-    field = min(_field(parameter, quantity), cells - len(unit) - 2)
+    inner = cells - 2
+    field = min(_field(parameter, quantity), inner)
     drawn = dashes(field) if text == NOT_AVAILABLE else big(text, field, plain=view.plain)
-    rows = [_heading(view, quantity, parameter, field + 1 + len(unit))]
+    side = _side(view, quantity, parameter) if inner > field + SIDE_CELLS else []
+    rows = []
     for number, part in enumerate(drawn):
         row = Text(no_wrap=True).append(part, style)
-        if number == ROWS - 1:
-            row.append(f" {unit}", FAINT)
+        if side:
+            row.append(" " * (inner - field - SIDE_CELLS))
+            row.append_text(side[number])
         rows.append(row)
-    rows.append(_bar(view, quantity, parameter, cells - END_CELLS))
-    for row in rows:
-        row.truncate(cells)
-        row.append(" " * (cells - row.cell_len))
-    return rows
+    title, right = _heading(view, quantity, parameter, short(unit, 4), inner)
+    return framed(title, right, rows, _bar(view, quantity, parameter, inner), cells)
 
 
 def _shown(view: View, quantity: Quantity, parameter: Parameter | None) -> tuple[str, str, Style]:
@@ -95,35 +134,57 @@ def _shown(view: View, quantity: Quantity, parameter: Parameter | None) -> tuple
 
 def _field(parameter: Parameter | None, quantity: Quantity) -> int:
     """The width of the digits: the same for every value of a parameter."""
+    signed = quantity != "motor_current"
     if parameter is None or not parameter.unit:
-        return readout_cells(0, signed=quantity == "output_frequency", whole=5)
-    follows = parameter.scale_by
-    scales = [parameter.scale, *(follows.scales.values() if follows is not None else ())]
-    decimals = max(decimals_of(Decimal(scale)) for scale in scales)
-    return readout_cells(decimals, signed=quantity == "output_frequency")
+        return readout_cells(0, signed=signed, whole=5)
+    decimals = decimal_places(parameter)
+    # a current of 100 A and more loses its decimal, which the status bar shows
+    return readout_cells(decimals, signed=signed, whole=3 if signed or not decimals else 2)
 
 
-def _heading(view: View, quantity: Quantity, parameter: Parameter | None, cells: int) -> Text:
-    """The name; behind it the reference, or the age of a value that is not the present."""
+def _heading(
+    view: View, quantity: Quantity, parameter: Parameter | None, unit: str, inner: int
+) -> tuple[Text, Text]:
+    """The name with the unit; at the right the reference, or the age of an old value."""
     title = TITLES[quantity]
     if parameter is not None and (mark := mark_of(view.profile, parameter)):
         title += f" {mark}"
-    text = Text(title, FAINT, no_wrap=True)
+    roomy = inner >= len(title) + len(unit) + 4
+    text = Text(f" {title}" if roomy else title, PLAIN, no_wrap=True)
+    text.append(f" {unit}", FAINT).append(" " if roomy else "")
     reading = view.reading(parameter.code) if parameter else None
-    right, style = "", FAINT
     if reading is not None and reading.quality is not Quality.GOOD and reading.raw is not None:
-        right, style = f"{age_text(reading.age(view.now))} old", STALE
-    elif quantity == "output_frequency" and (wanted := _reference(view)) is not None:
+        return text, Text(f" {age_text(reading.age(view.now))} old ", STALE)
+    if quantity == "output_frequency" and (wanted := _reference(view)) is not None:
         right = wanted.drawn(
             view.now,
-            current=lambda value: f"ref {value.text:>5}",
-            old=lambda value, age: "",
-            missing="",
+            current=lambda value: Text(f" ref {value.text:>5} ", FAINT),
+            old=lambda value, age: Text(),
+            missing=Text(),
         )
-    if right and len(title) + len(right) < cells:
-        text.append(" " * (cells - len(title) - len(right)))
-        text.append(right, style)
-    return text
+        return text, right
+    return text, Text()
+
+
+def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[Text]:
+    """The extremes on the page of the curve; nothing if the value is not kept."""
+    if quantity not in TREND_QUANTITIES or parameter is None:
+        return [Text()] * ROWS
+    place = TREND_QUANTITIES.index(quantity)
+    start, end = view.page_start, view.page_start + view.step.span
+    seen = [
+        value
+        for point in points_of_page(view)
+        if start <= point.time < end and (value := point.values[place]) is not None
+    ]
+    if not seen:
+        return [Text()] * ROWS
+    digits = decimal_places(parameter)
+    return [
+        Text("max", FAINT).append(f"{max(seen):>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
+        Text("min", FAINT).append(f"{min(seen):>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
+        Text(f"{span_text(view.step.span):>{SIDE_CELLS - 1}} ", FAINT),
+    ]
 
 
 def _reference(view: View) -> Shown | None:
@@ -133,11 +194,14 @@ def _reference(view: View) -> Shown | None:
     return reading if reading is not None and reading.current_number is not None else None
 
 
-def _bar(view: View, quantity: Quantity, parameter: Parameter | None, cells: int) -> Text:
-    """The value between its limits, the reference as a mark, the high end as a number."""
+def _bar(view: View, quantity: Quantity, parameter: Parameter | None, inner: int) -> Text:
+    """The value between its limits, the reference as a mark, the ends as numbers."""
     value = next((v for v in view.values if parameter and v.parameter == parameter.code), None)
-    high = end_of(view, value.high) if value else None
-    if parameter is None or value is None or high is None or high <= 0 or cells < 6:
+    if parameter is None or value is None:
+        return Text("")
+    place = TREND_QUANTITIES.index(quantity) if quantity in TREND_QUANTITIES else None
+    high = end_of(view, value.high) if place is None else bar_end(view, parameter, place)
+    if high is None or high <= 0:
         return Text("")
     reading = view.reading(parameter.code)
     fresh = reading is not None and reading.quality is Quality.GOOD
@@ -152,6 +216,11 @@ def _bar(view: View, quantity: Quantity, parameter: Parameter | None, cells: int
         wanted, reference = view.profile.quantity("frequency_reference"), _reference(view)
         mark = directed(view, wanted, reference.current_number) if fresh and reference else None
     reverse = (number or 0) < 0 or (mark or 0) < 0
-    low = -high if reverse else end_of(view, value.low) or 0.0
-    drawn = gauge(number, low, high, cells, mark, BAR if fresh else BAR_REST)
-    return drawn.append(cut(f" {'±' if reverse else ''}{high:g}", END_CELLS), FAINT)
+    low = -high if reverse else max(0.0, end_of(view, value.low) or 0.0)
+    first, last = f"{low:g} ", f" {high:g}"
+    cells = inner - len(first) - len(last) - 2
+    if cells < 4:
+        first, cells = "", inner - len(last) - 1
+    drawn = Text(f" {first}" if first else "", FAINT, no_wrap=True)
+    drawn.append_text(gauge(number, low, high, cells, mark, BAR if fresh else BAR_REST))
+    return drawn.append(f"{last} ", FAINT)

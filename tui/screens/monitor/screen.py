@@ -27,11 +27,12 @@ from ..frame import SELDOM
 from ..frame_source import stands_by
 from ..keys.action import MONITOR
 from ..keys.table import bindings, keys_line
-from .arrange import Arrangement, arrange
-from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words, word_parts
+from .arrange import READOUT_ROWS, WIDE, Arrangement, arrange
+from .assembly import codes_beside, curve_or_table, monitor_parts, tables, watched_words
 from .motor import other_values
-from .run_keys import InputKeys
-from .view import SPANS, USUAL_SPAN, View
+from .readouts import framed
+from .time_cursor import CursorKeys, TimeCursor
+from .view import View
 
 if TYPE_CHECKING:
     from ..app_port import Panel
@@ -67,11 +68,11 @@ STOP_SHOWN_FOR = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
-PLACED = frozenset({"top", "motor", "trend", "words", "state", "said"})
+PLACED = frozenset({"top", "motor", "curve", "state", "said"})
 """Parts whose rows depend on the room there is."""
 
 
-class MonitorScreen(InputKeys):
+class MonitorScreen(CursorKeys):
     """One drive, watched live; the screen only looks at what the line's worker brought."""
 
     CSS_PATH = "monitor.tcss"
@@ -83,17 +84,13 @@ class MonitorScreen(InputKeys):
         self.console = console
         self.session = console.session
         self._source: ViewSource | None = None
-        profile = self.session.profile
-        self._word: int | None = None if profile.quantity("output_frequency") else 0
-        """The word with all its bits in the place of the trend, which is None."""
-        self._words = watched_words(profile)
-        self._span = SPANS.index(USUAL_SPAN)
+        self._words = watched_words(self.session.profile)
         self._timer: Timer | None = None
         self._still: Timer | None = None
         self._reported: object = None
         """Urgent parts of the latest snapshot as last shown."""
         self._looked_at = -math.inf
-        self._run_rows = 0
+        self._bottom_rows = 0
         self._placed: tuple[Arrangement, int, int] | None = None
 
     def body(self) -> ComposeResult:
@@ -103,10 +100,7 @@ class MonitorScreen(InputKeys):
                 yield Lines(id="readouts")
                 yield Lines(id="state")
             yield Lines(id="motor")
-            yield Lines(id="trend")
-            with Horizontal(id="words"):
-                for index in range(WORDS_MOST):
-                    yield Lines(id=f"word{index}", classes="word")
+            yield Lines(id="curve")
         yield Lines(id="message")
 
     def on_mount(self) -> None:
@@ -155,8 +149,10 @@ class MonitorScreen(InputKeys):
     def _tell_still(self, since: str) -> None:
         """Nobody shall take what shines through under a dialog for the present."""
         if self.app.screen.styles.background.a < 1:
-            lead = [Text("")] * self._room().lead
-            self.put("state", [*lead, Text(f"as of {since}", STALE)])
+            room = self._room()
+            frozen = [Text(f"as of {since}", STALE), *[Text("")] * (READOUT_ROWS - 3)]
+            box = framed(Text(" State "), Text(), frozen, Text(), room.state_width)
+            self.put("state", [*[Text("")] * room.lead, *box])
 
     def on_screen_resume(self, event: ScreenResume) -> None:
         """Look again after another screen was on top."""
@@ -174,26 +170,23 @@ class MonitorScreen(InputKeys):
 
     def _room(self) -> Arrangement:
         """Return the number of rows of each part."""
-        return arrange(*self.size, len(other_values(self.session.profile)))
+        wide = self.size.width >= WIDE
+        return arrange(*self.size, len(other_values(self.session.profile, wide=wide)))
 
     def _place(self, room: Arrangement) -> None:
         """Give each part its rows; the layout runs again only if they change."""
-        bottom = max(room.bottom, self._run_rows)
+        bottom = max(room.bottom, self._bottom_rows)
         placed = (room, bottom, self.message_rows)
         if placed == self._placed:
             return
         there = {part.id for part in self.query("Lines, Horizontal, Vertical")}
-        if not there >= PLACED or len(self.query(".word")) < WORDS_MOST:
+        if not there >= PLACED:
             return  # not made yet, or on its way out
         self._placed = placed
-        self.set_class(not room.big, "plain")
-        rows = {"top": room.top, "motor": room.values, "trend": room.trend, "words": room.words}
+        rows = {"top": room.top, "motor": room.values, "curve": room.curve}
         for place, height in rows.items():
             self.query_one(f"#{place}").styles.height = height
-        self.query_one("#state").styles.width = room.state_width if room.big else "1fr"
-        for index in range(WORDS_MOST):
-            shown = room.wide and (index + 1) * 30 <= room.width
-            self.query_one(f"#word{index}").display = shown
+        self.query_one("#state").styles.width = room.state_width
         message = self.query_one("#message")
         message.styles.height = bottom
         message.styles.margin = (0, 0, 1 + placed[2], 0)
@@ -205,7 +198,7 @@ class MonitorScreen(InputKeys):
         if (run := self.run_line_lines(view.now, width)) is not None:
             parts["message"] = [*[Text("")] * (room.bottom - len(run)), *run]
         parts["keys"] = self._keys_of(view, width)
-        self._run_rows = len(run or ())
+        self._bottom_rows = len(parts["message"])
         self._place(room)
         for place, lines in parts.items():
             self.put(place, lines)
@@ -224,7 +217,7 @@ class MonitorScreen(InputKeys):
         if self._source is None:
             self._source = ViewSource(self.app, self.console)
         control = self.control(self.app.clock.monotonic())
-        return self._source.view(control, SPANS[self._span], self._word)
+        return self._source.view(control, self._word, self.time_cursor)
 
     def action_change_rate(self, step: int) -> None:
         """A faster or slower poll, out of a fixed row of rates."""
@@ -235,19 +228,19 @@ class MonitorScreen(InputKeys):
         self.look()
 
     def action_trend_window(self, step: int) -> None:
-        """A longer or shorter window of the trend."""
-        self._span = max(0, min(len(SPANS) - 1, self._span + step))
+        """A longer or shorter page of time."""
+        self.time_cursor = self.time_cursor.with_span(step)
         self.look()
 
     def action_next_word(self) -> None:
-        """The next word of bits; behind the last one the trend, where they share a place."""
+        """The next table of values or bits; behind the last one the curve."""
         room = self._room()
-        after = 0 if self._word is None and not room.wide else (self._word or 0) + 1
-        pages = len(pages_in(room, self._words))
-        self._word = None if not room.wide and after >= pages else after
+        found = tables(self.session.profile, room, self._words)
+        after = 0 if self._word is None else self._word + 1
+        self._word = after if after < len(found) else None
+        self.time_cursor = self.time_cursor.closed()
         if self.is_current and self.size.width:
-            for place, lines in word_parts(self._view(), room, self._words).items():
-                self.put(place, lines)
+            self.put("curve", curve_or_table(self._view(), room, self._words))
 
     def action_rating(self) -> None:
         """Enter the rated current of a drive that gives its current in %."""
@@ -279,8 +272,8 @@ class ViewSource:
         self._console = console
         self._was = ""
 
-    def view(self, control: Control, span: float, word: int | None) -> View:
-        """All that the screen shows now; `span` is the window of the trend in seconds."""
+    def view(self, control: Control, word: int | None, cursor: TimeCursor) -> View:
+        """All that the screen shows now; `word` is the table in the place of the curve."""
         app, console, session = self._app, self._console, self._console.session
         now, monitor, fleet = app.clock.monotonic(), console.monitor, app.fleet
         snapshot = monitor.latest
@@ -295,14 +288,17 @@ class ViewSource:
             period=monitor.period,
             now=now,
             read_only=app.read_only,
-            low_bandwidth=app.low_bandwidth,
             plain=app.plain_signs,
+            braille=app.has_braille,
             watch=fleet.line_watch.watch(session.device) if fleet else None,
             heard=session.line.device_state(session.device).heard,
             control=control,
             stop=self._stop(now),
             was=self._was,
-            span=span,
+            step=cursor.step,
+            apart=app.clock.wall_of(0.0),
+            page=cursor.page,
+            cursor=cursor.moment,
             stands_by=snapshot is not None and stands_by(console, snapshot.state),
             fault_at=self._fault_at(),
             word=word,

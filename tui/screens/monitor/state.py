@@ -11,12 +11,14 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.safety import WARNED_AT_SHARE
 from tui.session.command.stop_report import NOT_STOPPED, NOT_STOPPING, Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
+from tui.session.monitor.line_health import LEAST_REPLIES, POOR
 from tui.widgets.drawing import short, wrapped
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
     FAINT,
     FAULT_BLOCK,
+    KEY,
     PLAIN,
     RUNNING,
     STALE,
@@ -26,7 +28,9 @@ from tui.widgets.palette import (
 
 from .view import View, directed
 
-STATE_LABEL_CELLS = 11
+STATE_LABEL_CELLS = 8
+MORE_ROWS = 3
+"""Rows for what must be said about a state; the answers of the line keep theirs."""
 STANDSTILL = 0.05
 """Hz below which a motor is at standstill."""
 HEADS = {
@@ -36,20 +40,24 @@ HEADS = {
     Phase.STOPPED: ("STOPPED", STRONG),
     Phase.FAILED: (" NOT STOPPED ", FAULT_BLOCK),
 }
+SWAPPED = "in each word: check the byte order of the gateway or converter"
 SAYS_WHY = "press N"
 """Told where there is room for it."""
 
 
 def state_lines(view: View, width: int) -> list[Text]:
-    """Five lines: what it does, who commands, who gives the reference, its watch over the line."""
+    """Five lines: what it does, who commands, who gives the reference, its timeout, the answers.
+
+    While polling keeps its timeout from running out, that line has the time since the last poll.
+    """
     head, more = _head(view, width)
     rows = [
         _channel(view, "Command", "command_channel", width),
         _channel(view, "Reference", "reference_channel", width),
         _pair("Timeout", *_timeout(view, width), width),
-        _pair("Polled", *_heard(view), width),
+        _pair("Answers", *_answers(view), width),
     ]
-    lines = [head, *more[:4], *rows[len(more[:4]) :]]
+    lines = [head, *more[:MORE_ROWS], *rows[len(more[:MORE_ROWS]) :]]
     for line in lines:
         line.no_wrap = True
         line.truncate(width)
@@ -69,7 +77,9 @@ def _head(view: View, width: int) -> tuple[Text, list[Text]]:
         return Text(waits, ALARM), []
     if snapshot.contact == "swapped":
         why = "in each word: check the byte order of the gateway or converter"
-        return Text("BYTES SWAPPED", ALARM), [Text(line, PLAIN) for line in wrapped(why, width, 4)]
+        return Text("BYTES SWAPPED", ALARM), [
+            Text(line, PLAIN) for line in wrapped(why, width, MORE_ROWS)
+        ]
     if view.lost:
         return _lost(view, "NO ANSWER", width)
     if view.stop is not None and snapshot.state.kind != "fault":
@@ -82,7 +92,7 @@ def _stop(report: StopReport, width: int) -> tuple[Text, list[Text]]:
     text = report.text.removeprefix(NOT_STOPPED)
     if report.phase is Phase.STOPPED:
         text = "by the stop key"
-    most = 4 if report.phase in NOT_STOPPING else 2
+    most = MORE_ROWS if report.phase in NOT_STOPPING else 2
     return Text(words, style), [Text(line, PLAIN) for line in wrapped(text, width, most)]
 
 
@@ -148,19 +158,15 @@ def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]
     """Its code, its name, its time, and the key that shows what to do."""
     fault = state.fault
     code = fault.code if fault else "code not read"
-    name = wrapped(fault.name if fault else "", width, 2)
-    lines = [Text(line, STRONG) for line in name]
-    lines.append(Text(view.fault_at, FAINT))
-    lines += [Text("")] * (3 - len(lines))
-    lines.append(
-        Text.assemble(("press ", PLAIN), ("5", "bold #7fb0dc"), (" for what to do", PLAIN))
-    )
+    lines = [Text(short(fault.name if fault else "", width), STRONG), Text(view.fault_at, FAINT)]
+    lines.append(Text.assemble(("press ", PLAIN), ("5", KEY), (" for what to do", PLAIN)))
     return Text(f" FAULT {code} ", FAULT_BLOCK), lines
 
 
 def _pair(label: str, text: str, style: Style, width: int) -> Text:
-    line = Text(f"{label:<{STATE_LABEL_CELLS}}", FAINT, no_wrap=True)
-    return line.append(short(text, max(1, width - STATE_LABEL_CELLS)), style)
+    """A label at the left and its text at the right."""
+    text = short(text, max(1, width - len(label) - 1))
+    return Text(f"{label:<{width - len(text)}}", FAINT, no_wrap=True).append(text, style)
 
 
 def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
@@ -192,33 +198,37 @@ def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
 
 
 def _timeout(view: View, width: int) -> tuple[str, Style]:
-    """After how long without a request the drive acts."""
+    """After how long without a request the drive acts, and how long ago it last answered."""
     watch = view.watch
     if watch is None:
         return "none known", FAINT
     text = f"{watch.timeout:g} s"
     if watch.active:
-        return text, PLAIN
+        return _polled(view, text, watch.timeout)
     if not watch.acts:
         return "off", FAINT
     begins = ", starts when commanded"
-    return (
-        text + begins if width >= STATE_LABEL_CELLS + len(text + begins) else f"{text}, off"
-    ), FAINT
+    fits = width >= STATE_LABEL_CELLS + len(text + begins)
+    return (text + begins if fits else f"{text}, off"), FAINT
 
 
-def _is_fed(view: View) -> bool:
-    return view.watch is not None and view.watch.active
-
-
-def _heard(view: View) -> tuple[str, Style]:
-    """Return how long ago the drive answered, which keeps its timeout from running out."""
+def _polled(view: View, text: str, timeout: float) -> tuple[str, Style]:
+    """A timeout with the age of the last answer, in whole seconds: it changes seldom."""
     if view.heard is None:
-        return NOT_AVAILABLE, FAINT
+        return text, PLAIN
     age = max(0.0, view.now - view.heard)
-    text = f"{age:.1f} s ago" if age < 10 else f"{age_text(age)} ago"
-    hungry = _is_fed(view) and view.watch is not None and age > WARNED_AT_SHARE * view.watch.timeout
-    return text, STALE if hungry or view.lost else PLAIN
+    hungry = age > WARNED_AT_SHARE * timeout
+    polled = "<1 s" if age < 1 else f"{age:.0f} s" if age < 100 else age_text(age)
+    return f"{text}, polled {polled}", STALE if hungry or view.lost else PLAIN
+
+
+def _answers(view: View) -> tuple[str, Style]:
+    """Good answers out of the requests of the last minute, of the whole line."""
+    minute = view.counters.minute
+    if minute.share is None:
+        return NOT_AVAILABLE, FAINT
+    poor = minute.share < POOR and minute.replies >= LEAST_REPLIES
+    return f"{minute.good}/{minute.replies} in 60 s", ALARM if poor else PLAIN
 
 
 def countdown(view: View) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from decimal import Decimal
 
 from tui.bus.api import LineCounters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
-from tui.drive.values import Value
+from tui.drive.profile.schema import MonitoringValue, Parameter
+from tui.drive.values import Value, decimals_of
 from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
 from tui.session.drive_state import with_direction
@@ -15,11 +16,19 @@ from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.monitor.trend import TrendPoint
 from tui.session.shown import Shown
 from tui.session.timeout_report import TimeoutWatch
+from tui.widgets.curve import (
+    ASCII_SIGNS,
+    BLOCKS,
+    BRAILLE,
+    PAGE_STEPS,
+    CurveSigns,
+    PageStep,
+    page_start,
+)
 from tui.widgets.palette import age_text
 
-USUAL_SPAN = 60.0
-SPANS = (10.0, USUAL_SPAN, 600.0)
-"""Windows of the trend in seconds."""
+USUAL_STEP = PAGE_STEPS[2]
+"""Page of the curve at first: 60 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,10 +43,10 @@ class View:
     period: float
     now: float
     read_only: bool = False
-    low_bandwidth: bool = False
-    """True if the trend is left out and the screen looked at less often."""
     plain: bool = False
     """True if it is drawn in signs of ASCII."""
+    braille: bool = True
+    """True if the terminal has the dots of braille."""
     watch: TimeoutWatch | None = None
     """The drive's watch over the line, where it has one that runs."""
     heard: float | None = None
@@ -47,23 +56,45 @@ class View:
     """Result of a recent stop."""
     was: str = ""
     """Last known state of the drive."""
-    span: float = USUAL_SPAN
-    """Seconds that the trend shows."""
+    step: PageStep = USUAL_STEP
+    """Page of time that the curve shows."""
+    apart: float = 0.0
+    """Seconds since 1970 minus monotonic seconds, for the clock times of the axis."""
+    page: float | None = None
+    """Start of the page while the cursor holds it; None for the current page."""
+    cursor: float | None = None
+    """Moment that the cursor reads; None if there is no cursor."""
     stands_by: bool = False
     """True if the motor is at standstill and the next command of this panel runs it."""
     fault_at: str = ""
     """Time of day at which the fault was seen first; empty where that is not known."""
     word: int | None = None
-    """Which word is shown with all its bits in place of the trend; None for the trend."""
+    """Which table of values or bits is shown in place of the curve; None for the curve."""
 
     def reading(self, code: str) -> Shown | None:
         """A reading as good as it is now, not as it was when it came."""
         if self.snapshot is None or (reading := self.snapshot.readings.get(code)) is None:
             return None
-        rate = self.snapshot.rate
-        cycle = max(self.period, 1 / rate if rate else self.period)
         often = self.lost or not (self.slow(code) or self.rare(code))
-        return reading.aged(self.now, stale_after(cycle, often=often))
+        return reading.aged(self.now, stale_after(self.cycle, often=often))
+
+    @property
+    def cycle(self) -> float:
+        """Seconds from one cycle to the next, as wished or as the line allows."""
+        rate = self.snapshot.rate if self.snapshot is not None else 0.0
+        return max(self.period, 1 / rate if rate else self.period)
+
+    @property
+    def signs(self) -> CurveSigns:
+        """Characters of the terminal for curves."""
+        return ASCII_SIGNS if self.plain else BRAILLE if self.braille else BLOCKS
+
+    @property
+    def page_start(self) -> float:
+        """Start of the page of the curve."""
+        if self.page is not None:
+            return self.page
+        return page_start(self.now + self.apart, self.step) - self.apart
 
     def slow(self, code: str) -> bool:
         """Return True if the value is one that need not come with every cycle."""
@@ -110,24 +141,6 @@ class View:
         return ""
 
 
-def readout_parameter(profile: Profile, quantity: Quantity) -> Parameter | None:
-    """The parameter of a large readout.
-
-    A family whose manual confirms none may have one of that name, whose value is shown raw.
-    """
-    if (parameter := profile.quantity(quantity)) is not None:
-        return parameter
-    watched = (profile[value.parameter] for value in profile.data.monitoring.values)
-    names = READOUT_NAMES.get(quantity, ())
-    return next((p for p in watched if p.name.casefold() in names), None)
-
-
-READOUT_NAMES: dict[Quantity, tuple[str, ...]] = {
-    "output_frequency": ("output frequency",),
-    "motor_current": ("motor current", "output current"),
-}
-
-
 def directed(view: View, parameter: Parameter | None, number: float | None) -> float | None:
     """A value with the sign of its direction, which the drive may report beside it."""
     if number is None or parameter is None or view.snapshot is None:
@@ -153,3 +166,10 @@ def end_of(view: View, end: str) -> float | None:
 def bar_number(value: Value) -> float | None:
     """The engineering value for a bar; None for names and words."""
     return None if value.number is None else float(value.number)
+
+
+def decimal_places(parameter: Parameter) -> int:
+    """Return the decimals of a value, the most of all scales that it may have."""
+    follows = parameter.scale_by
+    scales = [parameter.scale, *(follows.scales.values() if follows is not None else ())]
+    return max(decimals_of(Decimal(scale)) for scale in scales)

@@ -13,7 +13,7 @@ from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Bit, Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.widgets.drawing import cut, rule
-from tui.widgets.palette import ALARM, FAINT, KEY, LINE, PLAIN, STRONG
+from tui.widgets.palette import ALARM, BAR, FAINT, KEY, LINE, PLAIN, STRONG
 
 from .view import View
 
@@ -65,6 +65,7 @@ DENIALS = frozenset({"no", "off", "none", "normal", "0"})
 GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
 """Texts of bits that add nothing to the name of a bit that is 1."""
 ALL_BITS = (("Tab", KEY), (" all bits ", FAINT))
+NEXT_BITS = (("Tab", KEY), (" next     ", FAINT))
 ALL_BITS_CELLS = 13
 
 
@@ -91,12 +92,11 @@ def word_line(view: View, parameter: Parameter, width: int) -> Text:
     text.append(f"{shown:<{RAW_CELLS}}", FAINT)
     reported = [] if raw is None else list(_true_words(parameter, raw))
     for at, (name, alarm) in enumerate(reported):
-        link = " · " if at else " "
         more = len(reported) - at
-        if text.cell_len + len(link) + len(name) + (5 if more > 1 else 0) > width:
+        if text.cell_len + len(name) + 4 + (5 if more > 1 else 0) > width:
             text.append(f" … {more}", FAINT)
             break
-        text.append(link, FAINT)
+        text.append("  " if at else " ").append("● ", ALARM if alarm else BAR)
         text.append(name, ALARM if alarm else PLAIN)
     return text
 
@@ -116,7 +116,7 @@ def alarm_line(view: View, width: int, *, tab: bool) -> Text:
     room = width - text.cell_len - (ALL_BITS_CELLS if tab else 1)
     text.append(cut(message, max(1, room)), style)
     if tab:
-        text.append_text(Text.assemble(*ALL_BITS))
+        text.append_text(Text.assemble(*(ALL_BITS if view.word is None else NEXT_BITS)))
     return text
 
 
@@ -131,6 +131,13 @@ def _alarms(view: View) -> tuple[str, Style]:
     watched = [view.profile[value.parameter] for value in view.values]
     tells = state.alarm is not None or any(bit.alarm for word in watched for bit in word.bits)
     return ("none" if tells else "not told by this drive"), FAINT
+
+
+def has_alarm(view: View) -> bool:
+    """True if the drive reports an alarm now."""
+    if view.snapshot is None or view.lost:
+        return False
+    return bool(view.snapshot.state.alarms or view.snapshot.state.alarm)
 
 
 def short_bit(bit: Bit, *, on: bool) -> str:

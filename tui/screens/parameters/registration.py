@@ -27,7 +27,6 @@ REGISTERED = (
         about="every parameter of the drive; edit, back up, compare, restore",
         digit="3",
         narrow="Par",
-        mark_cells=3,
         create=create_parameters,
         actions=(
             *ARMING,

@@ -1,0 +1,335 @@
+"""The curve: every sample in its cell, gaps left open, few cells changed, the cursor's reading."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.style import Style
+from rich.text import Text
+
+from tui.drive.profile import library
+from tui.screens.monitor.arrange import arrange
+from tui.screens.monitor.curves import MARK_SIGNS, clock_text, curve_lines
+from tui.screens.monitor.time_cursor import TimeCursor
+from tui.screens.monitor.view import View
+from tui.session.monitor.trend import TREND_MARKS, TrendPoint
+from tui.widgets.curve import (
+    ASCII_SIGNS,
+    BLOCKS,
+    BRAILLE,
+    PAGE_STEPS,
+    Curve,
+    CurveScale,
+    CurveSigns,
+    PageStep,
+    Plot,
+    curve_rows,
+    page_start,
+    round_up,
+    sample_at,
+    scale_of,
+)
+from tui.widgets.palette import CURSOR
+
+from . import fakes
+from .test_places import view_of
+
+PEN, OTHER = Style(color="#ffffff"), Style(color="#7fb0dc")
+FILLED = {chr(0x2800 + code): code for code in range(1, 256)}
+BRAILLE_DOTS = {
+    1: (0, 3),
+    2: (0, 2),
+    4: (0, 1),
+    8: (1, 3),
+    16: (1, 2),
+    32: (1, 1),
+    64: (0, 0),
+    128: (1, 0),
+}
+"""Column and height from below of each dot of a cell, as Unicode numbers them."""
+
+
+def lit_dots(rows: list[Text]) -> set[tuple[int, int]]:
+    """Dots of braille that are shown, as columns and heights from below."""
+    found = set()
+    for y, row in enumerate(reversed(rows)):
+        for x, character in enumerate(row.plain):
+            for dot, (across, up) in BRAILLE_DOTS.items():
+                if FILLED.get(character, 0) & dot:
+                    found.add((2 * x + across, 4 * y + up))
+    return found
+
+
+def plot_of(columns: int = 30, rows: int = 6, signs: CurveSigns = BRAILLE) -> Plot:
+    return Plot(100.0, 60.0, CurveScale(0.0, 60.0, (0.0, 60.0)), columns, rows, signs)
+
+
+@given(
+    st.floats(0, 59.9),
+    st.floats(0, 60),
+    st.integers(4, 80),
+    st.integers(2, 20),
+)
+def test_sample_lights_the_dot_of_its_time_and_value(
+    after: float, value: float, columns: int, rows: int
+) -> None:
+    plot = plot_of(columns, rows)
+    (dot,) = lit_dots(curve_rows([Curve([(100.0 + after, value)], PEN)], plot, 1.5))
+    assert dot[0] == int((100.0 + after - 100.0) * 2 * columns / 60)
+    assert abs(dot[1] - value / 60 * (4 * rows - 1)) <= 0.5 + 1e-9
+
+
+@pytest.mark.parametrize("signs", [BRAILLE, BLOCKS, ASCII_SIGNS])
+def test_each_kind_of_terminal_shows_the_ends_of_a_ramp(signs: CurveSigns) -> None:
+    ramp = [(100.0 + second, float(second)) for second in range(60)]
+    rows = [row.plain for row in curve_rows([Curve(ramp, PEN)], plot_of(signs=signs), 1.5)]
+    assert [len(row) for row in rows] == [30] * 6
+    empty = {" ", signs.grid}
+    assert rows[0][-1] not in empty
+    assert rows[-1][0] not in empty
+    assert set(rows[0][:20]) | set(rows[-1][12:]) <= empty
+    assert all(set(row) - empty for row in rows)
+    if signs is ASCII_SIGNS:
+        assert all(row.isascii() for row in rows)
+
+
+def test_characters_of_a_plot_without_braille() -> None:
+    level = [(100.0 + second, 60.0 if second < 30 else 0.0) for second in range(60)]
+    plain = Plot(100.0, 60.0, CurveScale(0, 60), 6, 2, ASCII_SIGNS)
+    for signs, shown in ((ASCII_SIGNS, ['"""|  ', "   |__"]), (BLOCKS, ["▀▀▀▄  ", "   █▄▄"])):
+        plot = replace(plain, signs=signs)
+        assert [row.plain for row in curve_rows([Curve(level, PEN)], plot, 1.5)] == shown
+
+
+def test_gap_of_a_failed_read_or_a_pause_stays_open() -> None:
+    plot = plot_of()
+    failed = [(110.0, 30.0), (111.0, None), (112.0, 30.0)]
+    assert len(lit_dots(curve_rows([Curve(failed, PEN)], plot, 5.0))) == 2
+    paused = [(110.0, 30.0), (120.0, 30.0)]
+    assert len(lit_dots(curve_rows([Curve(paused, PEN)], plot, 9.9))) == 2
+    joined = lit_dots(curve_rows([Curve(paused, PEN)], plot, 10.0))
+    assert joined == {(x, 12) for x in range(10, 21)}
+
+
+@given(st.lists(st.floats(0, 60), min_size=2, max_size=40))
+def test_curve_has_no_hole_while_values_arrive(values: list[float]) -> None:
+    """Each column of dots between the first and the last has one that touches its neighbor."""
+    samples = [(100.0 + 1.5 * at, value) for at, value in enumerate(values)]
+    dots = lit_dots(curve_rows([Curve(samples, PEN)], plot_of(), 1.5))
+    columns = {x: sorted(y for at, y in dots if at == x) for x, _ in dots}
+    assert sorted(columns) == list(range(min(columns), max(columns) + 1))
+    for x, heights in columns.items():
+        assert heights == list(range(heights[0], heights[-1] + 1))
+        before = columns.get(x - 1)
+        if before is not None:
+            assert heights[0] - before[-1] <= 1
+            assert before[0] - heights[-1] <= 1
+
+
+def test_reference_holds_until_its_next_value_and_the_output_is_over_it() -> None:
+    plot = plot_of()
+    reference = Curve([(100.0, 0.0), (110.0, 60.0), (119.0, 60.0)], OTHER, held=True)
+    dots = lit_dots(curve_rows([reference], plot, 20.0))
+    assert {y for x, y in dots if x < 10} == {0}
+    assert {x for x, y in dots if y == 0 and x < 10} == {0, 2, 4, 6, 8}, "dotted"
+    assert {y for x, y in dots if x > 10} == {23}
+    assert {y for x, y in dots if x == 10} <= set(range(24))
+    output = Curve([(102.0, 0.0)], PEN)
+    row = curve_rows([output, reference], plot, 20.0)[-1]
+    styles = {row.plain[s.start : s.end]: s.style for s in row.spans if s.start <= 1 < s.end}
+    assert list(styles.values()) == [PEN]
+
+
+def changed_cells(before: list[Text], after: list[Text]) -> int:
+    """Cells that look different."""
+    found = 0
+    for old, new in zip(before, after, strict=True):
+        size = max(len(old.plain), len(new.plain))
+        for at in range(size):
+            looks = [
+                (text.plain[at : at + 1], [s.style for s in text.spans if s.start <= at < s.end])
+                for text in (old, new)
+            ]
+            found += looks[0] != looks[1]
+    return found
+
+
+ATV71 = library.load("atv71")
+
+
+def running_view(now: float, seconds: float = 120.0, period: float = 0.5) -> View:
+    """A motor whose frequency and current never rest, watched for some time up to now."""
+    points = tuple(
+        TrendPoint(at, (30 + 20 * math.sin(at / 7), 4 + math.sin(at), 50.0))
+        for at in (now - seconds + period * n for n in range(int(seconds / period) + 1))
+    )
+    view = view_of(ATV71, fakes.RUNNING)
+    assert view.snapshot is not None
+    return replace(
+        view, trend=points, now=now, snapshot=replace(view.snapshot, readings={}, time=now)
+    )
+
+
+@pytest.mark.parametrize(("size", "most"), [((80, 24), 6), ((120, 40), 9), ((200, 60), 14)])
+def test_new_sample_changes_few_cells_until_the_page_turns(
+    size: tuple[int, int], most: int
+) -> None:
+    room = arrange(*size, 9)
+    start, turns = 1000.0, 0
+    before = curve_lines(running_view(start), room)
+    for cycle in range(1, 61):
+        view = running_view(start + cycle / 2)
+        after = curve_lines(view, room)
+        changed = changed_cells(before, after)
+        if changed > most:
+            turns += 1
+            assert (view.now + view.apart) % view.step.turn < 0.5 + 1e-6, "only a turn changes more"
+        before = after
+    assert turns in (1, 2), "30 s have one or two turns of 20 s"
+
+
+def test_same_values_change_no_cell() -> None:
+    room, view = arrange(120, 40, 9), running_view(1010.0)
+    later = replace(view, now=1010.2)
+    assert changed_cells(curve_lines(view, room), curve_lines(later, room)) == 0
+
+
+@given(st.floats(1e9, 2e9), st.sampled_from(PAGE_STEPS))
+def test_now_is_on_the_page_with_most_of_its_time_before_it(now: float, step: PageStep) -> None:
+    start = page_start(now, step)
+    assert start <= now < start + step.span
+    assert now - start >= step.span - step.turn - 1e-3
+    assert start % step.turn == pytest.approx((start // step.turn) * 0 + (-step.span) % step.turn)
+
+
+def test_old_values_are_not_shown_as_the_present_one() -> None:
+    room = arrange(80, 24, 9)
+    fresh = "\n".join(line.plain for line in curve_lines(view_of(ATV71, fakes.RUNNING), room))
+    assert "─50.0" in fresh
+    for view in (
+        view_of(ATV71, fakes.RUNNING, age=20.0),
+        replace(view_of(ATV71, fakes.RUNNING), page=fakes.NOW - 60, cursor=fakes.NOW - 10),
+    ):
+        assert "─50.0" not in "\n".join(line.plain for line in curve_lines(view, room))
+
+
+def test_marks_are_at_their_time_and_explained_only_if_they_occur() -> None:
+    room, base = arrange(120, 40, 9), running_view(1000.0)
+    base = replace(base, apart=0.0)
+    heading = curve_lines(base, room)[0].plain
+    for mark in TREND_MARKS:
+        sign, _, name = MARK_SIGNS[mark]
+        assert sign not in heading
+        points = tuple(replace(p, mark=mark if p.time == 990.0 else "") for p in base.trend)
+        lines = curve_lines(replace(base, trend=points), room)
+        assert f"{sign} {name}" in lines[0].plain
+        columns = 120 - 6 - 7
+        axis = lines[1 + room.plot + 1 + room.band].plain
+        assert axis.index(sign) == 6 + int((990.0 - page_start(1000.0, base.step)) / 60 * columns)
+
+
+def test_most_urgent_of_several_marks_in_a_cell_is_shown() -> None:
+    view = replace(running_view(1000.0), apart=0.0)
+    marked = {990.0: "reference", 990.5: "trip"}
+    points = tuple(replace(p, mark=marked.get(p.time, "unknown to us")) for p in view.trend)
+    axis = curve_lines(replace(view, trend=points), arrange(60, 16, 9))[-1].plain
+    assert "■" in axis
+    assert "◆" not in axis
+
+
+def test_clock_times_are_below_their_ticks() -> None:
+    view = replace(view_of(ATV71, fakes.RUNNING), apart=fakes.StillClock().wall_of(0.0))
+    *_, axis, times = curve_lines(view, arrange(80, 24, 9))
+    text = clock_text(view.now + view.apart)
+    # the page ends at the next full 20 s; a tick every 10 s
+    seconds = int(text[6:8])
+    last = (seconds // 10) * 10
+    assert f"{text[:6]}{last:02}" in times.plain
+    ticks = [at for at, sign in enumerate(axis.plain) if sign in "┬╷"]
+    assert {b - a for a, b in pairwise(ticks)} <= {11, 12}
+    middle = times.plain.index(f"{text[:6]}{last:02}") + 4
+    assert middle in ticks
+
+
+@given(st.lists(st.floats(0, 100), min_size=1, max_size=30), st.floats(0, 110), st.floats(0.1, 20))
+def test_cursor_reads_the_last_sample_before_it(
+    times: list[float], moment: float, reach: float
+) -> None:
+    samples = [(time, float(at)) for at, time in enumerate(sorted(times))]
+    expected = None
+    for time, value in samples:
+        if time <= moment and moment - time <= reach:
+            expected = (time, value)
+    assert sample_at(samples, moment, reach) == expected
+
+
+def test_cursor_shows_values_of_its_moment_and_none_in_a_gap() -> None:
+    points = tuple(
+        TrendPoint(940.0 + at, (float(at), at / 10, 50.0) if at < 30 or at > 40 else (None,) * 3)
+        for at in range(60)
+    )
+    view = replace(view_of(ATV71, fakes.RUNNING), trend=points, period=1.0, apart=0.0)
+    view = replace(view, page=940.0, cursor=950.4)
+    assert view.snapshot is not None
+    view = replace(view, snapshot=replace(view.snapshot, rate=1.0))
+    heading = curve_lines(view, arrange(120, 40, 9))[0].plain.split()
+    assert heading[0].endswith(":50.0")
+    assert heading[1:9] == ["output", "10.0", "Hz", "current", "1.0", "A", "reference", "50.0"]
+    gap = curve_lines(replace(view, cursor=975.0), arrange(120, 40, 9))[0].plain.split()
+    assert gap[1:9] == ["output", "-----", "Hz", "current", "-----", "A", "reference", "-----"]
+
+
+def test_cell_under_the_cursor_is_marked_in_every_row() -> None:
+    rows = curve_rows([Curve([(130.0, 30.0)], PEN)], plot_of(), 1.5, cursor=15)
+    for row in rows:
+        (style,) = [s.style for s in row.spans if s.start <= 15 < s.end]
+        assert isinstance(style, Style)
+        assert style.bgcolor == CURSOR.bgcolor
+
+
+def test_cursor_moves_by_a_column_turns_the_page_and_stays_within_the_samples() -> None:
+    cursor = TimeCursor().opened(1000.0, 0.0)
+    assert cursor.page == page_start(1000.0, PAGE_STEPS[2])
+    left = cursor.moved(-1, 60, 500.0, 1000.0)
+    assert left.moment is not None
+    assert math.floor(left.moment) == 999
+    assert left.page == cursor.page
+    far = left.moved(-100, 60, 500.0, 1000.0)
+    assert far.moment is not None
+    assert far.page is not None
+    assert math.floor(far.moment) == 899
+    assert far.page <= far.moment < far.page + 60
+    assert far.moved(-9999, 60, 500.0, 1000.0).moment == 500.0
+    assert far.moved(9999, 60, 500.0, 1000.0).moment == 1000.0
+    assert cursor.closed() == TimeCursor()
+    assert cursor.with_span(1) == TimeCursor(PAGE_STEPS[3])
+    assert TimeCursor().with_span(-9).step.span == 10
+    assert TimeCursor().with_span(9).step.span == 600
+
+
+@given(st.floats(1e-3, 1e5))
+def test_axis_ends_at_a_round_number(value: float) -> None:
+    top = round_up(value)
+    assert value <= top * (1 + 1e-6)
+    assert top <= 1.34 * value
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "rows", "labels"),
+    [
+        (0, 60, 9, (0, 15, 30, 45, 60)),
+        (0, 60, 16, (0, 15, 30, 45, 60)),
+        (-60, 60, 9, (-60, -30, 0, 30, 60)),
+        (0, 12, 5, (0, 6, 12)),
+        (0, 50, 3, (0, 50)),
+    ],
+)
+def test_labels_of_an_axis_are_round(
+    low: float, high: float, rows: int, labels: tuple[float, ...]
+) -> None:
+    assert scale_of(low, high, rows).labels == labels

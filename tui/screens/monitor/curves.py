@@ -1,0 +1,379 @@
+"""The curves of frequency and current with their axes, marks and cursor; pure functions."""
+
+from __future__ import annotations
+
+import math
+import time
+from bisect import bisect_left
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.values import NOT_AVAILABLE
+from tui.safety import STALE_CYCLES
+from tui.session.monitor.trend import (
+    REFERENCE_PLACE,
+    TREND_MARKS,
+    TREND_QUANTITIES,
+    TrendMark,
+    TrendPoint,
+    readout_parameter,
+)
+from tui.widgets.curve import (
+    Curve,
+    CurveScale,
+    Plot,
+    Samples,
+    curve_rows,
+    round_up,
+    sample_at,
+    scale_of,
+)
+from tui.widgets.drawing import short
+from tui.widgets.palette import (
+    ALARM,
+    ATTENTION,
+    BAR,
+    CURSOR,
+    FAINT,
+    FAULT,
+    KEY,
+    LINE,
+    PLAIN,
+    RUNNING,
+    STALE,
+    STRONG,
+)
+
+from .arrange import Arrangement
+from .view import View, decimal_places, directed, end_of
+
+LABEL_CELLS = 5
+MARGIN_CELLS = 7
+"""Cells after a curve for the present value."""
+REFERENCE_STYLE = Style(color=KEY.color)
+NAMES: dict[Quantity, str] = {"output_frequency": "output", "motor_current": "current"}
+MARK_SIGNS: dict[TrendMark, tuple[str, Style, str]] = {
+    "lost": ("×", ALARM, "no answer"),
+    "trip": ("■", FAULT, "trip"),
+    "stop": ("▼", STRONG, "stop"),
+    "start": ("▶", RUNNING, "start"),
+    "reset": ("↑", STRONG, "reset"),
+    "write": ("●", ATTENTION, "write"),
+    "reference": ("◆", REFERENCE_STYLE, "reference"),
+}
+"""Sign, style and name of each mark."""
+
+
+class ShownPage(NamedTuple):
+    """The page of time that is drawn, with what all its parts need."""
+
+    view: View
+    points: Sequence[TrendPoint]
+    """Points of the page, and one beyond each edge."""
+    columns: int
+    marks: dict[int, TrendMark]
+
+    def plot(self, rows: int, scale: CurveScale) -> Plot:
+        """Return a plot of the page."""
+        return _plot(self.view, self.columns, rows, scale)
+
+
+class Band(NamedTuple):
+    """One quantity with its own vertical axis."""
+
+    quantity: Quantity
+    parameter: Parameter
+    place: int
+    """Its place among the values of a point."""
+
+
+def bands(view: View) -> list[Band]:
+    """Return the quantities that have a curve, the first for the large plot."""
+    found = []
+    for place, quantity in enumerate(TREND_QUANTITIES):
+        parameter = readout_parameter(view.profile, quantity)
+        if quantity in NAMES and parameter is not None:
+            found.append(Band(quantity, parameter, place))
+    return found
+
+
+def curve_lines(view: View, room: Arrangement) -> list[Text]:
+    """The heading, the curves and the axis of time, in exactly the rows of the part."""
+    found = bands(view)
+    if not found:
+        nothing = Text("  No curve: no document says where output and current are.", FAINT)
+        return [nothing, *[Text("")] * (room.curve - 1)]
+    columns = room.width - LABEL_CELLS - 1 - MARGIN_CELLS
+    points = points_of_page(view)
+    page = ShownPage(view, points, columns, _marks(view, points, columns))
+    lines = [_heading(view, found[0], page.marks, room.width)]
+    lines += _band_lines(page, found[0], room.plot)
+    if room.band:
+        rest = [Text("")] * (room.band + 1)
+        second = found[1] if len(found) > 1 else None
+        lines += [_between(second, page), *_band_lines(page, second, room.band)] if second else rest
+    return [*lines, *_axis(page, room.axis)]
+
+
+def _plot(view: View, columns: int, rows: int, scale: CurveScale) -> Plot:
+    return Plot(view.page_start, view.step.span, scale, columns, rows, view.signs)
+
+
+def samples_of(points: Sequence[TrendPoint], place: int) -> Samples:
+    """Return the values at a place of each point, with their times."""
+    return [(point.time, point.values[place]) for point in points]
+
+
+def points_of_page(view: View) -> Sequence[TrendPoint]:
+    """Return the points of the page, and one beyond each edge."""
+    start = view.page_start
+    first = bisect_left(view.trend, start, key=_time)
+    end = bisect_left(view.trend, start + view.step.span, key=_time)
+    return view.trend[max(0, first - 1) : end + 1]
+
+
+def _time(point: TrendPoint) -> float:
+    return point.time
+
+
+def reach_of(view: View) -> float:
+    """Return the longest time in s between two values that are connected."""
+    return STALE_CYCLES * view.cycle
+
+
+def _band_lines(page: ShownPage, band: Band, rows: int) -> list[Text]:
+    view = page.view
+    values = samples_of(page.points, band.place)
+    curves = [Curve(values, FAINT if view.lost else STRONG if band.place == 0 else BAR)]
+    if band.quantity == "output_frequency" and _has_reference(view):
+        curves.append(Curve(samples_of(page.points, REFERENCE_PLACE), REFERENCE_STYLE, held=True))
+    plot = page.plot(rows, _scale(view, band, curves, rows))
+    drawn = curve_rows(
+        curves,
+        plot,
+        reach_of(view),
+        ticks=tuple(column for column, _ in _ticks(page)),
+        marks=tuple(page.marks),
+        cursor=None if view.cursor is None else plot.column(view.cursor),
+    )
+    labels = {plot.row(value): value for value in plot.scale.labels}
+    present = _present(view, band)
+    at = plot.row(present[0]) if present is not None else None
+    lines = []
+    for row, cells in enumerate(drawn):
+        value = labels.get(row)
+        label = "" if value is None else short(f"{value:g}", LABEL_CELLS)
+        line = Text(f"{label:>{LABEL_CELLS}}", FAINT, no_wrap=True)
+        line.append("┤" if label else "│", LINE)
+        line.append_text(cells)
+        if present is not None and row == at:
+            line.append("─", LINE)
+            line.append(f"{short(present[1], MARGIN_CELLS - 1):<{MARGIN_CELLS - 1}}", STRONG)
+        lines.append(line)
+    return lines
+
+
+def _has_reference(view: View) -> bool:
+    return readout_parameter(view.profile, "frequency_reference") is not None
+
+
+def _present(view: View, band: Band) -> tuple[float, str] | None:
+    """Return the current value with its text; None if it is old or missing."""
+    reading = view.reading(band.parameter.code)
+    number = reading.current_number if reading is not None else None
+    if reading is None or number is None or view.page is not None:
+        return None
+    if band.quantity == "output_frequency":
+        number = directed(view, band.parameter, number)
+    if number is None:
+        return None
+    digits = decimal_places(band.parameter)
+    return number, f"{number:.{digits}f}"
+
+
+def _scale(view: View, band: Band, curves: Sequence[Curve], rows: int) -> CurveScale:
+    """Return the scale: to the end of the value's bar, or to the next round number above all."""
+    seen = [abs(value) for curve in curves for _, value in curve.samples if value is not None]
+    highest = max(seen, default=0.0)
+    end = bar_end(view, band.parameter, band.place)
+    if highest > (end or 0.0):
+        end = round_up(highest)
+    high = end or 1.0
+    signed = any(value is not None and value < 0 for curve in curves for _, value in curve.samples)
+    return scale_of(-high if signed else 0.0, high, rows)
+
+
+def bar_end(view: View, parameter: Parameter, place: int) -> float | None:
+    """Return the end of a value's bar; if the profile has none, a round number above all seen."""
+    for value in view.values:
+        if value.parameter == parameter.code and (end := end_of(view, value.high)):
+            return end if end > 0 else None
+    seen = [abs(v) for point in view.trend if (v := point.values[place]) is not None]
+    reading = view.reading(parameter.code)
+    seen.append(abs(reading.current_number or 0.0) if reading is not None else 0.0)
+    return round_up(max(seen)) if max(seen) > 0 else None
+
+
+def _marks(view: View, points: Sequence[TrendPoint], columns: int) -> dict[int, TrendMark]:
+    """Return the marks of the page by column, the most urgent of each."""
+    plot = _plot(view, columns, 1, CurveScale(0, 1))
+    found: dict[int, TrendMark] = {}
+    for point in points:
+        mark = next((item for item in TREND_MARKS if item == point.mark), None)
+        if mark is None or (column := plot.column(point.time)) is None:
+            continue
+        before = found.get(column)
+        if before is None or TREND_MARKS.index(mark) < TREND_MARKS.index(before):
+            found[column] = mark
+    return found
+
+
+def _ticks(page: ShownPage) -> list[tuple[int, float]]:
+    """Return the columns of the ticks, with their time of day in seconds since 1970."""
+    view, plot = page.view, page.plot(1, CurveScale(0, 1))
+    tick = view.step.tick
+    first = math.ceil((plot.start + view.apart) / tick - 1e-6) * tick
+    found = []
+    for number in range(round(view.step.span / tick) + 1):
+        wall = first + number * tick
+        # half a column later: the floating point error of the clock moves no tick
+        column = plot.column(wall - view.apart + view.step.span / page.columns / 1000)
+        if column is not None:
+            found.append((column, wall))
+    return found
+
+
+def _axis(page: ShownPage, rows: int) -> list[Text]:
+    """The axis, drawn up to now, with the marks; below it clock times."""
+    view, columns, plot = page.view, page.columns, page.plot(1, CurveScale(0, 1))
+    ticks = _ticks(page)
+    reached = plot.column(view.now) if view.now < plot.end else columns
+    reached = -1 if reached is None else reached
+    cells = [("─", FAINT) if column <= reached else (" ", FAINT) for column in range(columns)]
+    for column, _ in ticks:
+        cells[column] = ("┬", FAINT) if column <= reached else ("╷", LINE)
+    names = _clock_times(view, ticks, columns)
+    if rows == 1:
+        cells = [
+            (names[column], FAINT) if names[column] != " " else cell
+            for column, cell in enumerate(cells)
+        ]
+    for column, mark in page.marks.items():
+        cells[column] = MARK_SIGNS[mark][:2]
+    at = plot.column(view.cursor) if view.cursor is not None else None
+    if at is not None:
+        cells[at] = (cells[at][0] if cells[at][0] != " " else "┴", KEY + CURSOR)
+    axis = Text(" " * LABEL_CELLS, no_wrap=True).append("└", LINE)
+    for character, style in cells:
+        axis.append(character, style)
+    if rows == 1:
+        return [axis]
+    return [axis, Text(" " * (LABEL_CELLS + 1), no_wrap=True).append(names, FAINT)]
+
+
+FULL_CELLS = 10
+"""Columns of a tick from which its clock time is written in full."""
+
+
+def _clock_times(view: View, ticks: Sequence[tuple[int, float]], columns: int) -> str:
+    """Return the line of clock times below the ticks."""
+    cells = [" "] * (columns + MARGIN_CELLS)
+    apart = columns * view.step.tick / view.step.span
+    end = 0
+    whole = False
+    for column, wall in ticks:
+        clock = time.localtime(wall)
+        text = time.strftime("%H:%M:%S", clock)
+        if view.step.tick >= 60:
+            text = text[:5]
+        elif apart < FULL_CELLS and (whole or column + 4 < 8) and clock.tm_sec:
+            text = text[5:]
+        at = column - len(text) // 2
+        if at < end or at + len(text) > len(cells):
+            continue
+        whole = whole or len(text) == 8
+        cells[at : at + len(text)] = text
+        end = at + len(text) + 1
+    return "".join(cells)
+
+
+def _between(band: Band, page: ShownPage) -> Text:
+    """The line above the second band, with its name."""
+    unit = short(band.parameter.unit or "raw", LABEL_CELLS - 1)
+    text = Text(f" {unit:<{LABEL_CELLS - 1}}", FAINT, no_wrap=True).append("├─ ", LINE)
+    text.append_text(_sample("⠒⠒", BAR, page.view)).append(f" {NAMES[band.quantity]} ", FAINT)
+    return text.append("─" * max(0, page.columns + LABEL_CELLS + 1 - text.cell_len), LINE)
+
+
+def _heading(view: View, band: Band, marks: dict[int, TrendMark], width: int) -> Text:
+    """The names of curves and marks; with the cursor, the values at its moment."""
+    if view.cursor is not None:
+        return _read_out(view, view.cursor, width)
+    unit = band.parameter.unit or "raw"
+    right = Text.assemble(("<", KEY), (f" {span_text(view.step.span)} ", FAINT), (">", KEY))
+    right.append("  =", KEY).append(" read ", FAINT)
+    left = Text(f" {short(unit, LABEL_CELLS - 1):<{LABEL_CELLS - 1}} ", FAINT, no_wrap=True)
+    left.append_text(_sample("⠒⠒", STRONG, view)).append(f" {NAMES[band.quantity]}", FAINT)
+    if band.quantity == "output_frequency" and _has_reference(view):
+        left.append("  ").append_text(_sample("⠂⠂", REFERENCE_STYLE, view))
+        left.append(" reference", FAINT)
+    for mark in sorted(set(marks.values()), key=TREND_MARKS.index):
+        sign, style, name = MARK_SIGNS[mark]
+        if left.cell_len + len(name) + 4 + right.cell_len >= width:
+            break
+        left.append("  ").append(sign, style).append(f" {name}", FAINT)
+    left.append(" " * max(1, width - left.cell_len - right.cell_len))
+    return left.append_text(right)
+
+
+def _sample(dots: str, style: Style, view: View) -> Text:
+    """Two cells of a curve, as this terminal draws them."""
+    if view.plain:
+        dots = "--" if dots == "⠒⠒" else "= "
+    elif not view.braille:
+        dots = "▄▄" if dots == "⠒⠒" else "▄ "
+    return Text(dots, style)
+
+
+def _read_out(view: View, moment: float, width: int) -> Text:
+    """The values at the moment of the cursor, with the time at which they were read."""
+    text = Text(no_wrap=True)
+    found, points = None, points_of_page(view)
+    for place, quantity in enumerate(TREND_QUANTITIES):
+        parameter = readout_parameter(view.profile, quantity)
+        if parameter is None:
+            continue
+        item = sample_at(samples_of(points, place), moment, reach_of(view))
+        found = found or item
+        name = NAMES.get(quantity, "reference")
+        text.append(f"   {name} ", FAINT)
+        value = None if item is None else item[1]
+        if value is None:
+            text.append(f"{NOT_AVAILABLE:>7}", FAINT)
+        else:
+            text.append(f"{value:>7.{decimal_places(parameter)}f}", STRONG)
+        text.append(f" {parameter.unit or 'raw'}", FAINT)
+    at = found[0] if found is not None else moment
+    head = Text(f" {clock_text(at + view.apart)}", PLAIN if found is not None else STALE)
+    line = head.append_text(text)
+    line.no_wrap = True
+    keys = Text.assemble(("← →", KEY), (" move ", FAINT), ("Esc", KEY), (" close ", FAINT))
+    if line.cell_len + keys.cell_len < width:
+        line.append(" " * (width - line.cell_len - keys.cell_len))
+        line.append_text(keys)
+    return line
+
+
+def clock_text(wall: float) -> str:
+    """A time of day to the tenth of a second, cut and not rounded."""
+    tenths = math.floor(wall * 10 + 1e-6)
+    return f"{time.strftime('%H:%M:%S', time.localtime(tenths // 10))}.{tenths % 10}"
+
+
+def span_text(seconds: float) -> str:
+    """A page of time as a person reads it."""
+    return f"{seconds:g} s" if seconds < 120 else f"{seconds / 60:g} min"

@@ -1,0 +1,341 @@
+"""Curves over time that stay where they are drawn: new values change only the cells at their end.
+
+The page of time does not scroll. It turns when its end is reached, so few cells change with a
+sample. Pure functions; times are seconds on one clock, values in the unit of the scale.
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_left, bisect_right
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import groupby, pairwise
+from typing import NamedTuple
+
+from rich.style import Style
+from rich.text import Text
+
+from .palette import CURSOR, KEY, LINE
+
+Samples = Sequence[tuple[float, float | None]]
+"""Times and values, oldest first; None for a value that was not read."""
+
+
+class PageStep(NamedTuple):
+    """Seconds of a page, of one tick of its axis, and by which it turns."""
+
+    span: float
+    tick: float
+    turn: float
+
+
+PAGE_STEPS: Sequence[PageStep] = (
+    PageStep(10, 2, 4),
+    PageStep(30, 5, 10),
+    PageStep(60, 10, 20),
+    PageStep(120, 20, 40),
+    PageStep(300, 60, 60),
+    PageStep(600, 120, 120),
+)
+"""A turn is whole ticks, so the ticks stay in their columns."""
+
+
+class CurveSigns(NamedTuple):
+    """Characters of a terminal for curves; a cell has `across` x `down` dots."""
+
+    across: int
+    down: int
+    glyphs: Sequence[str]
+    """By the dots of a cell: those of the left column first, each column from its lowest dot."""
+    dotted: Sequence[str]
+    """The same for a dotted curve."""
+    grid: str
+    mark: str
+    """Vertical line of a mark."""
+
+
+_LEFT, _RIGHT = (0x40, 0x04, 0x02, 0x01), (0x80, 0x20, 0x10, 0x08)
+"""Braille dots of both columns, from the lowest."""
+
+
+def _braille(dots: int) -> str:
+    code = 0x2800
+    for bit in range(4):
+        code += _LEFT[bit] * (dots >> bit & 1) + _RIGHT[bit] * (dots >> bit + 4 & 1)
+    return chr(code)
+
+
+_BRAILLE = tuple(_braille(dots) for dots in range(256))
+BRAILLE = CurveSigns(2, 4, _BRAILLE, _BRAILLE, "·", "┆")
+BLOCKS = CurveSigns(1, 2, " ▄▀█", " ▄▀█", "·", "│")
+"""For consoles whose fonts have no braille."""
+ASCII_SIGNS = CurveSigns(1, 3, ' _-|"|||', " .=:':::", " ", "!")
+
+
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """Values of one quantity and how they are drawn."""
+
+    samples: Samples
+    style: Style
+    held: bool = False
+    """True if a value holds until the next one, as a reference does. It is drawn dotted."""
+
+
+@dataclass(frozen=True, slots=True)
+class CurveScale:
+    """Ends of the vertical axis, and the values that have a label."""
+
+    low: float
+    high: float
+    labels: tuple[float, ...] = ()
+
+    def dot(self, value: float, dots: int) -> int:
+        """Return the dot of a value, 0 at the low end; beyond an end the dot of that end."""
+        share = (value - self.low) / (self.high - self.low) if self.high > self.low else 0.0
+        return round(max(0.0, min(1.0, share)) * (dots - 1))
+
+
+@dataclass(frozen=True, slots=True)
+class Plot:
+    """Place of curves: the page of time, the scale, the cells."""
+
+    start: float
+    span: float
+    scale: CurveScale
+    columns: int
+    rows: int
+    signs: CurveSigns = BRAILLE
+
+    @property
+    def end(self) -> float:
+        """The first moment after the page."""
+        return self.start + self.span
+
+    def column(self, time: float) -> int | None:
+        """Return the column of a moment; None outside the page."""
+        column = math.floor((time - self.start) / self.span * self.columns)
+        return column if 0 <= column < self.columns else None
+
+    def row(self, value: float) -> int:
+        """Return the row of a value, 0 at the top."""
+        down = self.signs.down
+        return self.rows - 1 - self.scale.dot(value, self.rows * down) // down
+
+
+def page_start(moment: float, step: PageStep) -> float:
+    """Return the start of the page on which a moment is drawn (seconds on the clock of people)."""
+    return (math.floor(moment / step.turn) + 1) * step.turn - step.span
+
+
+def on_page(samples: Samples, start: float, end: float) -> Samples:
+    """Return the samples of a page, and one more at each side for the lines that cross its edge."""
+    times = _Times(samples)
+    first = bisect_left(times, start)
+    last = bisect_left(times, end)
+    return samples[max(0, first - 1) : last + 1]
+
+
+def sample_at(samples: Samples, moment: float, reach: float) -> tuple[float, float | None] | None:
+    """Return the last sample before a moment, at most `reach` seconds old; None without one."""
+    at = bisect_right(_Times(samples), moment) - 1
+    if at < 0 or moment - samples[at][0] > reach:
+        return None
+    return samples[at]
+
+
+class _Times(Sequence[float]):
+    """Times of samples, for searching."""
+
+    def __init__(self, samples: Samples) -> None:
+        self._samples = samples
+
+    def __len__(self) -> int:
+        return len(self._samples)
+
+    def __getitem__(self, at: int) -> float:  # type: ignore[override]
+        return self._samples[at][0]
+
+
+def dots_of(curve: Curve, plot: Plot, reach: float) -> list[int]:
+    """Return the dots of a curve: by column of dots, a bit for each, the lowest first.
+
+    Two values are connected if they are at most `reach` seconds apart and no failed read is
+    between them.
+    """
+    width, height = plot.columns * plot.signs.across, plot.rows * plot.signs.down
+    columns = [0] * width
+    per_second = width / plot.span
+    place: list[tuple[float, int, int] | None] = []
+    for time, value in on_page(curve.samples, plot.start, plot.end):
+        if value is None:
+            place.append(None)
+            continue
+        x = math.floor((time - plot.start) * per_second)
+        y = plot.scale.dot(value, height)
+        place.append((time, x, y))
+        if 0 <= x < width:
+            columns[x] |= 1 << y
+    for before, after in pairwise(place):
+        if before is not None and after is not None and after[0] - before[0] <= reach:
+            _connect(columns, before[1:], after[1:], held=curve.held)
+    return [_thinned(dots, x) for x, dots in enumerate(columns)] if curve.held else columns
+
+
+def _connect(
+    columns: list[int], first: tuple[int, int], last: tuple[int, int], *, held: bool
+) -> None:
+    """Draw a line from dot to dot; a held value is level up to the next."""
+    (x, y), (end, target) = first, last
+
+    def level(at: int) -> int:
+        if held:
+            return target if at >= end else y
+        return round(y + (target - y) * (at - x) / (end - x)) if end > x else y
+
+    if end == x:
+        if 0 <= x < len(columns):
+            columns[x] |= _between(y, target)
+        return
+    begin = max(x + 1, 0)
+    previous = level(begin - 1)
+    for at in range(begin, min(end, len(columns) - 1) + 1):
+        reached = level(at)
+        # the dot of the column before is drawn there
+        joint = previous + (reached > previous) - (reached < previous)
+        columns[at] |= _between(previous if held else joint, reached)
+        previous = reached
+
+
+def _between(first: int, last: int) -> int:
+    """Return the dots from the first to the last."""
+    low, high = min(first, last), max(first, last)
+    return (1 << high + 1) - (1 << low)
+
+
+_EVERY_SECOND = int("01" * 256, 2)
+
+
+def _thinned(dots: int, x: int) -> int:
+    """Leave out every second dot of a level or vertical line."""
+    if dots & dots - 1:
+        return dots & (_EVERY_SECOND << (x & 1))
+    return 0 if x & 1 else dots
+
+
+def curve_rows(
+    curves: Sequence[Curve],
+    plot: Plot,
+    reach: float,
+    *,
+    ticks: tuple[int, ...] = (),
+    marks: tuple[int, ...] = (),
+    cursor: int | None = None,
+) -> list[Text]:
+    """Return the rows of a plot; in each cell the first of the curves that has a dot there.
+
+    `ticks` are columns of the grid, `marks` columns of vertical lines, `cursor` the column that
+    is read.
+    """
+    lit: list[dict[int, CurveCell]] = [{} for _ in range(plot.rows)]
+    for curve in reversed(curves):
+        for row, column, character in _cells(curve, plot, reach):
+            lit[row][column] = character, curve.style
+    labelled = {plot.row(value) for value in plot.scale.labels}
+    rows = []
+    for row, found in enumerate(lit):
+        empty = _empty_row(plot.signs, plot.columns, ticks, marks, row in labelled)
+        if not found and cursor is None:
+            rows.append(_row(empty))
+            continue
+        cells = list(empty)
+        for column, cell in found.items():
+            cells[column] = cell
+        if cursor is not None and 0 <= cursor < plot.columns:
+            cells[cursor] = _under_cursor(cells[cursor], is_lit=cursor in found)
+        rows.append(_row(tuple(cells)))
+    return rows
+
+
+CurveCell = tuple[str, Style]
+
+
+def _cells(curve: Curve, plot: Plot, reach: float) -> Iterator[tuple[int, int, str]]:
+    """Yield row, column and character of each cell that has a dot of the curve."""
+    signs, dots = plot.signs, dots_of(curve, plot, reach)
+    glyphs, down = signs.dotted if curve.held else signs.glyphs, signs.down
+    full = (1 << down) - 1
+    for column in range(plot.columns):
+        parts = dots[column * signs.across : (column + 1) * signs.across]
+        left = parts[0]
+        right = parts[1] if signs.across == 2 else 0
+        rest = left | right
+        while rest:
+            above = (rest & -rest).bit_length() - 1
+            level = above // down
+            shift = level * down
+            cell = left >> shift & full | (right >> shift & full) << down
+            yield plot.rows - 1 - level, column, glyphs[cell]
+            rest = rest >> shift + down << shift + down
+
+
+GRID_EVERY = 3
+"""Columns from one dot of a level grid line to the next."""
+
+
+@lru_cache(maxsize=64)
+def _empty_row(
+    signs: CurveSigns, columns: int, ticks: tuple[int, ...], marks: tuple[int, ...], labelled: bool
+) -> tuple[CurveCell, ...]:
+    """Return a row without a curve: the lines of marks and the grid."""
+    cells = []
+    for column in range(columns):
+        grid = column % GRID_EVERY == 1 if labelled else column in ticks
+        sign = signs.mark if column in marks else signs.grid if grid else " "
+        cells.append((sign, LINE))
+    return tuple(cells)
+
+
+def _under_cursor(cell: CurveCell, *, is_lit: bool) -> CurveCell:
+    """Return a cell as the cursor shows it, also on a terminal without colors."""
+    return (cell[0], cell[1] + CURSOR) if is_lit else ("│", KEY + CURSOR)
+
+
+@lru_cache(maxsize=256)
+def _row(cells: tuple[CurveCell, ...]) -> Text:
+    """Return cells as a text; callers copy it before changing it."""
+    text = Text(no_wrap=True)
+    for style, run in groupby(cells, key=lambda cell: cell[1]):
+        text.append("".join(character for character, _ in run), style)
+    return text
+
+
+ROUND_NUMBERS = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10)
+
+
+def round_up(value: float) -> float:
+    """Return the next round number from a positive value on."""
+    if value <= 0 or not math.isfinite(value):
+        return 1.0
+    power = 10.0 ** math.floor(math.log10(value))
+    fitting = (number * power for number in ROUND_NUMBERS if number * power >= value * (1 - 1e-9))
+    return next(fitting, 10 * power)
+
+
+ROUND_STEPS = (1, 1.5, 2, 2.5, 3, 4, 5, 6, 10)
+STEPS_MOST = 5
+
+
+def scale_of(low: float, high: float, rows: int) -> CurveScale:
+    """Return the scale from low to high with as many round labels as the rows have room for."""
+    span = high - low
+    for steps in range(max(1, min(STEPS_MOST, (rows - 1) // 2)), 0, -1):
+        step = span / steps
+        digits = step / 10.0 ** math.floor(math.log10(step)) if step > 0 else 1.0
+        if any(math.isclose(digits, number) for number in ROUND_STEPS) and (
+            low == 0 or steps % 2 == 0
+        ):
+            return CurveScale(low, high, tuple(low + step * at for at in range(steps + 1)))
+    return CurveScale(low, high, (low, high))
