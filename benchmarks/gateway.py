@@ -58,7 +58,7 @@ STORED_SEVERAL = f"{CLIENTS} clients, values fresh for {FRESH:g} s"
 
 
 def mbpoll_reads(seconds: float, *where: str) -> int:
-    """How often mbpoll got all words in this many seconds."""
+    """Number of times that mbpoll got all words in this many seconds."""
     options = f"-a {DEVICE} -0 -r {ADDRESS} -c {WORDS} -t 4:hex -l {MBPOLL_PERIOD_MS}".split()
     process = subprocess.Popen(
         ["stdbuf", "-oL", "mbpoll", *options, *where], stdout=subprocess.PIPE, text=True
@@ -202,7 +202,7 @@ def measured(wire: WireLine, seconds: float, *, with_mbpoll: bool) -> dict[str, 
         note(ALONE, reads, seconds)
     for fresh, names in ((0.0, (THROUGH, SEVERAL)), (FRESH, (STORED, STORED_SEVERAL))):
         with gateway(wire.text, fresh) as port:
-            asyncio.run(client_reads(port, 1, 0.5))  # by then it is known who the drive is
+            asyncio.run(client_reads(port, 1, 0.5))  # by then the drive is identified
             if with_mbpoll and not fresh:
                 wire.take()
                 reads = mbpoll_reads(seconds, "-m", "tcp", "-p", str(port), "127.0.0.1")

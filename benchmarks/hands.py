@@ -4,10 +4,10 @@
 
 The panel runs on a pseudo-terminal with one simulated Altivar 71 on Monitor, over a relay that
 keeps every write. First bursts: the drive is armed, sometimes with the run line open or the motor
-running, and a random piece of keys with one stop key in it arrives in one read or cut at random
-places, as after a link that hung. The same while a question of Control, of the proof or of Frames
-stands or is carried out, and on two panels of one line of which either gets the stop. Then keys:
-random ones, alone and in pieces, and each by itself, with the drive not armed. It counts every
+running, and a random burst of keys with one stop key arrives in one read or cut at random places,
+as after a link that hung. The same while a question of Control, of the timeout test or of Frames is
+open or its action runs, and on two panels of one line of which either gets the stop. Then keys:
+random ones, single and in bursts, and each one alone, with the drive disarmed. It counts every
 write that is not a stop; the count must be 0. Last, ends: every signal, resizes, keys while a line
 opens, and an error in the drawing of each screen, each with a motor running.
 """

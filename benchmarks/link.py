@@ -2,10 +2,10 @@
 
     python -m benchmarks.link [--rounds N] [--presses N] [--seconds S] [--link NAME] [--only NAME]
 
-Each program runs behind a private SSH server on loopback; between it and the client stands a link
-of so many bytes a second and so long a round trip (link_proxy). Times of a start count from the
-word that the login prints before it becomes the program, so that the time of the login is separate;
-times of a key count from its byte. The targets are printed with the figures, not asserted.
+Each program runs behind a private SSH server on loopback; between it and the client is a link with
+a rate and a round trip (link_proxy). Times of a start count from the word that the login prints
+before it becomes the program, so that the time of the login is separate; times of a key count from
+its byte. The targets are printed with the figures, not asserted.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ PrintLastLog no
 
 
 def missing() -> str | None:
-    """What a private SSH server needs and is missing, in words; None if all is available."""
+    """Name the programs that a private SSH server needs and that are missing; None if all exist."""
     for name, package in (
         ("sshd", "openssh-server"),
         ("ssh", "openssh-client"),

@@ -165,7 +165,7 @@ def panel(bench: Bench, size: tuple[int, int]) -> dict[str, Figures]:
 
 def faster(terminal: Terminal) -> None:
     """Poll at 10 Hz instead of 2 Hz."""
-    for rate in ("5.0", "10.0"):  # one after another: keys that come at once are not taken
+    for rate in ("5.0", "10.0"):  # one after another: keys that arrive together are ignored
         terminal.press("\x10")
         terminal.see("Type a word")
         terminal.press("twice")

@@ -54,8 +54,8 @@ WRITTEN, STOPPED = 0.15, 0.01
 AGES = (0.0, 0.0, 0.2)
 """Greatest ages in s that the reads accept."""
 FAULTS = Faults(late=0.02, lost=0.01, duplicated=0.0, corrupted=0.02, noise=0.01)
-"""No reply comes twice unless asked for: of the first copy on a line RTU gives no means to tell
-that it is one (see `truth`). The next owner gets the earlier ones.
+"""No reply comes twice unless requested: RTU cannot show that the first copy on a line is one (see
+`truth`). The next owner gets the earlier ones.
 """
 TIMING = replace(FAST, late_reply=Timing().late_reply, frame_gap=Timing().frame_gap)
 """Quick, but for what comes late because the computer is busy with all these programs."""

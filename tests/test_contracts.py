@@ -208,7 +208,7 @@ def test_panel_is_shown_before_line_modules_are_imported() -> None:
     assert "tui.screens.frames.registration" in loaded
     screens = {name for name in loaded if re.fullmatch(r"tui\.screens\.\w+\.screen", name)}
     assert screens == {"tui.screens.connection.screen"}
-    # to make one takes ten times as long as a named tuple
+    # creating one takes ten times as long as a named tuple
     assert set(data_classes.split()) <= {"OpenLine"}
     assert not loaded & {
         "tui.session.monitor.monitor",

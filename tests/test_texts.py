@@ -126,6 +126,12 @@ CHECKS: dict[int, Check] = {
     ),
     27: Check("N", of(r"^one$", 0), "one"),
     26: Check("T", of(r"^test_(what|who|where|the_order_of|\d)_", 0), "test_who_asks"),
+    28: Check(
+        "T",
+        of(r"_(nobody|somebody|anybody|whoever|anew|meanwhile|elsewhere)(_|$)"
+           r"|^test_(it|its|one_that|of_two)_|all_the_same", 0),
+        "test_it_is_read_by_nobody",
+    ),
 }  # fmt: skip
 
 PROFILE_CHECKS = (*range(1, 19), 24)
@@ -268,7 +274,9 @@ def all_texts() -> tuple[Text, ...]:
         found += texts_of(tree_of(path), name)
         found.append(Text("N", name, 0, path.stem))
     for path in modules(TESTS):
-        found += texts_of(tree_of(path), path.relative_to(ROOT).as_posix(), "NT")
+        found += texts_of(tree_of(path), path.relative_to(ROOT).as_posix(), "SNT")
+    for path in modules(ROOT / "benchmarks"):
+        found += texts_of(tree_of(path), path.relative_to(ROOT).as_posix(), "S")
     for folder in (ROOT / "docs", ROOT / "profiles", ROOT / "benchmarks", TESTS):
         for page in sorted(folder.rglob("*.md")):
             found += _paragraphs(page)

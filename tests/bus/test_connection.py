@@ -102,7 +102,7 @@ async def test_unplug_fails_all_requests_and_replug_reconnects(
                 assert isinstance(result, LineLost)
     with PtyPeer(honest, link=port):
         await asyncio.to_thread(eventually, lambda: line.state.status is LineStatus.CONNECTED)
-        # another shape than before, whose reply may still be on its way
+        # another form than before, whose reply may still arrive
         assert (await line.read(1, 5, 2)).words == (5, 6)
     assert seen[0].status is LineStatus.LOST
     assert LineStatus.CONNECTED in [state.status for state in seen]

@@ -73,7 +73,7 @@ async def test_request_with_another_reply_length_does_not_wait_for_a_late_reply(
         line = open_line(peer.path, timing)
         with pytest.raises(NoAnswer):
             await line.read(1, 10, priority=OPERATOR)
-        # the late reply comes before this one's own; then nothing is held back any more
+        # the late reply arrives before the reply to this one; then nothing waits any more
         assert (await line.read(1, 20, 2, priority=OPERATOR)).words == (20, 21)
         assert (await line.read(1, 30, priority=OPERATOR)).words == (30,)
 
@@ -348,7 +348,7 @@ async def test_operator_read_is_repeated_if_unanswered(open_line: OpenLine) -> N
     with PtyPeer(second_lost) as peer:
         line = open_line(peer.path, timing)
         assert (await line.read(1, 5, priority=OPERATOR)).words == (5,)
-        # at once: the lost reply would be as good, if it came yet
+        # immediately: the lost reply would be valid too, if it still arrived
         got = await line.read(1, 6, priority=OPERATOR)
         assert got.words == (6,)
         assert len(peer.requests) == 3

@@ -161,7 +161,7 @@ async def test_stop_is_kept_while_a_line_one_behind_cannot_be_reopened(
         line = opened(open_line, RtuTcpLink("127.0.0.1", peer.port), WIDE)
         await until_named(line)
     await asyncio.to_thread(eventually, lambda: "cannot be reached" in line.state.reason)
-    with pytest.raises(NoAnswer):  # so that the stop goes on without a look
+    with pytest.raises(NoAnswer):  # so that the stop continues without a read
         await line.read(1, 100, priority=Priority.STOP)
     for _ in range(2):
         with pytest.raises(LineLost, match="cannot be reached"):

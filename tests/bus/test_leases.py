@@ -162,7 +162,7 @@ async def test_next_holder_takes_over_stop_instructions(share: Share) -> None:
             line.facts.accepts_care = hear
         await asyncio.to_thread(holder.close)
         await asyncio.to_thread(eventually, lambda: _meet(lines, [first, second]))
-        # whichever holds the line hears how to stop what the other one has armed, and arms nothing
+        # the holder of the line learns how to stop drives armed by the other, and arms nothing
         holds, other = first, second
         if second.facts.programs[0] == second.facts.me:
             holds, other = second, first

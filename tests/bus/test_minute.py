@@ -163,7 +163,7 @@ def test_scan_does_not_count(ended: Ended) -> None:
 
 def test_frames_of_another_master_are_foreign(ended: Ended) -> None:
     ended.good(1)
-    ended.heard(frame(1, bytes.fromhex("0300640002")))  # asks a drive of ours
+    ended.heard(frame(1, bytes.fromhex("0300640002")))  # polls one of our drives
     ended.heard(frame(8, bytes.fromhex("030400010002")))  # a drive that no program here polls
     assert (ended.line.foreign, ended.line.strays) == (2, 0)
     assert 8 not in ended.tally.devices

@@ -87,7 +87,7 @@ async def test_port_that_opens_after_its_line_closed_is_closed(port: SlowPort) -
 
 async def test_loop_runs_while_the_system_closes_a_port(port: SlowPort) -> None:
     begun = time.monotonic()
-    # a driver that waits for the last bytes of an adapter that takes none
+    # a driver that waits for the last bytes of an adapter that accepts none
     closed_beside("port", port.open)
     assert time.monotonic() - begun < ALARM_AFTER
     with pytest.raises(LineLost, match="the system does not answer"):

@@ -255,7 +255,7 @@ def test_reused_pid_is_not_killed(listener: Any) -> None:
     process.kill()
     with suppress(ConnectionResetError):
         connection.recv(1)
-    # its number is not free yet, and could be any other's soon
+    # its number is not free yet, and could soon be that of another process
     assert not KeeperProcess(owner(process.pid), connection).kill()
 
 

@@ -146,7 +146,7 @@ async def test_subscriber_never_gets_a_reply_twice(share: Share) -> None:
             turns = await asyncio.to_thread(subscriber.await_turns, 20)
             times = [cast(Reply, turn.take(wanted.turns[0][0], 0.0)).time for turn in turns]
             assert times == sorted(set(times))
-        # each took some replies of the other
+        # each got some replies of the other
         assert len(peer.requests) < len(watch.turns) + len(panel.turns)
 
 
@@ -402,7 +402,7 @@ async def test_full_line_lengthens_all_periods_by_one_factor(
         alone = Subscriber(watch, plan(reads(100, count=10)))
         await asyncio.to_thread(alone.await_turns, 2)
         eventually(lambda: watch.pace.stretch == 1.0)
-        # the first read is the same, and comes from the wire once
+        # the first read is the same, and is sent once
         more = reads(100, *range(200, 240, 2), count=10)
         other = Subscriber(panel, plan(more))
         await asyncio.to_thread(other.await_turns, 2)

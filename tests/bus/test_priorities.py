@@ -172,7 +172,7 @@ async def test_operator_request_is_sent_during_the_back_off(open_line: OpenLine)
         peer.script = honest
         got = await line.read(DEAD, 2, priority=Priority.OPERATOR_READ)
         assert got.words == (2,)
-        # it answers: polls go out again at once
+        # it answers: polls are sent again immediately
         assert (await line.read(DEAD, 3)).words == (3,)
 
 

@@ -85,7 +85,7 @@ async def test_priorities_hold_across_programs_with_one_exchange_in_flight(
         await asyncio.gather(first, *waiting, stop)
         order = kinds(peer)
         assert order[:3] == [(3, 1), (6, 40), (6, 30)]
-        # a next request that runs into the one before would be read at once with it
+        # a request that follows the previous one without a gap would be read together with it
         assert [len(burst) for burst in peer.bursts] == [8] * len(order)
 
 
@@ -213,7 +213,7 @@ async def test_drive_commanded_by_another_program_is_not_written(share: Share) -
         for line in (owner, third):
             with pytest.raises(RequestRefused, match="Drive 1 is commanded by run"):
                 await line.write(1, 8, [1])
-        # not even where the writer has not heard of it yet: the owner refuses
+        # not even if the writer does not know of it yet: the owner refuses
         third.facts.note_commander(1, None)
         with pytest.raises(RequestRefused, match="Drive 1 is commanded by run"):
             await third.write(1, 8, [1])
@@ -236,7 +236,7 @@ async def test_one_of_two_simultaneous_claims_is_denied(share: Share) -> None:
         denied: list[str] = []
         for line in programs:
             on_event(line.facts, ControlDenied, partial(note_denied, denied, line.facts.me.name))
-        # neither can hear of the other's claim before its own is on its way
+        # neither knows of the other's claim before its own is sent
         with frozen(programs[0]), frozen(programs[1]):
             assert [line.facts.claim(4) for line in programs] == ["", ""]
         eventually(lambda: len(denied) == 1)

@@ -139,7 +139,7 @@ async def test_next_owner_waits_for_replies_to_a_killed_owner(share: Share, tmp_
         assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
         assert peer.arrivals[-1] - killed < 2.0
         assert times_sent(peer, 6) == 1
-        # at once if the system has it in its list of processes no more
+        # immediately if the process no longer exists
         await come(lambda: gone == ["run"])
 
 
@@ -215,7 +215,7 @@ async def test_next_owner_reports_programs_that_exited_with_the_owner(
         os.kill(owner.process.pid, 9)
         eventually(lambda: sorted(gone) == ["panel", "run"])
         assert line.facts.commander(4) is None
-        # each of them once, and not the one that came back
+        # each of them once, and not the one that reconnected
         await asyncio.sleep(0.7)
         assert sorted(gone) == ["panel", "run"]
 
@@ -281,7 +281,7 @@ async def test_malformed_message_of_one_program_does_not_affect_others(
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
         with raw(lines) as connection:
-            with suppress(OSError):  # the owner does not hear it out
+            with suppress(OSError):  # the owner does not read it to the end
                 connection.sendall(output)
             for line in (owner, other):
                 assert (await asyncio.wait_for(line.read(1, 5), 10)).words == (5,)
@@ -489,7 +489,7 @@ async def test_hung_disk_does_not_keep_a_line_closed(
             assert (await line.read(1, 100)).words == (100,)
         finally:
             answers.set()
-        # the lock that came too late is given back
+        # the lock that was acquired too late is released
         monkeypatch.setattr(OwnerLock, "take", take)
         other = OwnerLock(place_in(lines.folder))
         await asyncio.to_thread(eventually, other.take)

@@ -143,7 +143,7 @@ async def test_write_typed_before_a_stop_is_refused_after_it(
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("run")
         await owner.read(1, 1)
-        # a client that has not heard of the stop yet
+        # a client that does not know of the stop yet
         with frozen(other):
             run = asyncio.create_task(other.write(1, 1, [RUN]))
             await asyncio.sleep(0.02)
@@ -248,7 +248,7 @@ async def test_stop_kept_by_a_frozen_owner_is_sent_by_the_next(share: Share) -> 
         with frozen(owner):
             with pytest.raises(LineLost, match=NOT_ENDED):
                 await send_stop(other, 1)
-            # each key press is one more, and fails at once
+            # each key press is another stop, and fails immediately
             with pytest.raises(LineLost, match=NOT_ENDED):
                 await send_stop(other, 2)
             server = owner._engine._shared._server  # type: ignore[union-attr]

@@ -59,7 +59,7 @@ async def test_values_return_once_the_drive_has_echoed_a_number(
     with PtyPeer(slow) as peer, other_program(peer.path, tmp_path, "run", LATE) as owner:
         killed = await killed_while_it_waits(owner, peer)
         line = await asyncio.to_thread(next_program, share, peer, WIDE)
-        # the reply to the killed one comes first, and has the form of the one to this read
+        # the reply to the killed program arrives first, and has the form of the reply to this read
         assert (await line.read(1, OTHER)).words == (OTHER,)
         assert time.monotonic() - killed < 1.0
         # the read between shows if the adapter echoes

@@ -77,7 +77,7 @@ def test_commands_of_a_section_run_as_printed(
             assert "needs a terminal" in ended(2, *words).stderr
         else:
             with monkeypatch.context() as there:
-                there.chdir(tmp_path)  # programs of their own are run where the checkout is
+                there.chdir(tmp_path)  # separate programs run in the checkout
                 assert ended(status, *words).exit_code == status, line
 
 

@@ -78,7 +78,7 @@ def test_line_is_one_level_of_a_topic() -> None:
         line_topics("plant", ["/dev/a", "dev/a"])
 
 
-# Which broker, and whose password
+# Broker and password
 
 
 def test_url_selects_the_broker() -> None:

@@ -142,7 +142,7 @@ def test_another_master_ends_the_scan_before_anything_is_sent(options: tuple[str
             master.join()
         assert peer.requests == []
     assert done.exit_code == 5
-    # whichever was heard first
+    # the one received first
     assert "Address 6: " in done.stderr
     assert "read of register 3201 to 3204" in done.stderr
     assert "write of register 8501" in done.stderr

@@ -87,11 +87,11 @@ def test_status_does_not_list_a_shown_timeout_as_unread(
 def test_status_omits_a_timeout_learned_after_its_words_were_read(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def learnt_meanwhile(session: DriveSession, motion: str) -> None:
+    def learned_late(session: DriveSession, motion: str) -> None:
         session.timeout = Timeout(True, TimeoutWatch(10.0, None))
 
     monkeypatch.setattr(drive_status, "STATUS_WITHIN", 2.0)
-    monkeypatch.setattr(drive_status, "left_behind", learnt_meanwhile)
+    monkeypatch.setattr(drive_status, "left_behind", learned_late)
     with tcp_line("atv71@1") as line:
         lose(monkeypatch, TIMEOUT_WORD, 60.0)
         document = json.loads(ended(3, "status", line, "--json").stdout)

@@ -34,7 +34,7 @@ def test_configuration_sets_the_values_of_its_manual(family: str, id: str) -> No
     sources = {source.id: source for source in library.load(family).data.control_sources}
     settings = {setting.parameter: setting.value for setting in sources[id].settings}
     assert settings.items() >= MANUAL[family, id].items()
-    # beside these only switches, held where no other channel comes into force
+    # otherwise only switches, at a value where no other channel becomes active
     rest = settings.keys() - MANUAL[family, id].keys()
     assert {code: settings[code] for code in rest}.items() <= FIXED.items()
 

@@ -115,7 +115,7 @@ def test_control_source_with_an_unknown_word_is_refused(
     tmp_path: Path, family: str, right: str, wrong: str
 ) -> None:
     text = (library.packaged_folder() / f"{family}.toml").read_text("utf-8")
-    if not right:  # a family that has none yet
+    if not right:  # a family without one
         way = f'command = {{ sources = ["{wrong}"] }}\nreference = {{ sources = ["Line"] }}'
         source = f'[[control_sources]]\nid = "one"\nname = "One"\n{way}\nsettings = []\n'
         text = text.replace("[[parameters]]", f"{source}\n[[parameters]]", 1)

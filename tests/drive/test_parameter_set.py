@@ -148,7 +148,7 @@ def test_duplicate_parameter_is_refused() -> None:
 def test_truncated_file_is_always_detected(share: float) -> None:
     """At any character, also between two lines."""
     text = small()
-    # without its last line break it is whole yet
+    # without its last line break it is still whole
     cut = text[: int((len(text) - 1) * share)]
     with pytest.raises(SetError):
         read(cut)

@@ -144,7 +144,7 @@ def _terminals(program: str, socket: Path) -> Iterator[Callable[[list[str]], Ter
     def start(command: list[str]) -> Terminal:
         terminal = Terminal(tmux)
         started.append(terminal)
-        # what the program said stays readable where it ends at once
+        # the output stays readable if the program ends immediately
         terminal.run(
             *("new-session", "-d", "-x", "80", "-y", "24", f"exec {shlex.join(command)}"),
             *(";", "set-option", "-g", "remain-on-exit", "on"),

@@ -199,7 +199,7 @@ def test_leave_running_leaves_the_motor_running_and_names_the_timeout() -> None:
         assert stands(simulation)
 
 
-# run: what goes wrong
+# run: errors
 
 
 def test_trip_ends_the_run_and_is_reported() -> None:
@@ -517,7 +517,7 @@ def test_started_motor_that_no_scan_finds_exits_with_3() -> None:
         assert "Device 31, Altivar 71: stopped." in done.stdout
 
 
-# stop, and who the drive says it is
+# stop, and the identification of the drive
 
 
 def test_stop_is_not_refused_for_a_wrong_profile() -> None:

@@ -131,7 +131,7 @@ def leave_questions(panel: PtyPanel) -> None:
 
 def test_spaced_keys_on_a_hung_link_are_ignored_and_reported(panel: PtyPanel) -> None:
     before = len(panel.log.writes)
-    panel.type("arrv")  # typed 2 s apart, let through at once
+    panel.type("arrv")  # typed 2 s apart, delivered together
     panel.shows("4 keys came together and were")
     panel.settle()
     assert panel.log.writes[before:] == []

@@ -232,7 +232,7 @@ def test_wrong_password_is_reported(
     assert "ot authorized" in output or "ot authorised" in output
 
 
-# A motor whose client has died
+# Motors of dead clients
 
 
 def test_publish_does_not_keep_the_motor_of_a_dead_client_running(programs: ExitStack) -> None:

@@ -127,7 +127,7 @@ def goes_on_stopped(simulation: Simulation, runner: Served) -> None:
     """A frozen `run` goes on, hears that its motor was stopped, and sends it nothing but stops."""
     runner.process.send_signal(signal.SIGCONT)
     output, _ = runner.process.communicate(timeout=PATIENCE)
-    # it hears of the stop on its return, or how many there were if it was taken for gone
+    # it learns of the stop when it resumes, or their number if it was disconnected
     by = ("drivepanel stop, stop", "a stop while this program was suspended")
     assert any(f"was stopped by {text}" in output for text in by)
     assert runner.process.returncode == 6
@@ -187,7 +187,7 @@ def test_motor_of_a_frozen_program_is_taken_over_by_a_key(
         panel.press("T")
         wait_until(lambda: "aken over" in panel.text(), "it is taken over")
         before = simulation.drive(1).raw("CMD")
-        # it comes back to a drive that is another's, and its motor turns on
+        # it resumes with a drive of another commander, and its motor runs on
         runner.process.send_signal(signal.SIGCONT)
         panel.wait_for("The line is shared with run")
         time.sleep(3)
@@ -278,7 +278,7 @@ def test_stop_beside_run_ends_it_and_names_the_program(programs: ExitStack) -> N
         output, _ = runner.process.communicate(timeout=PATIENCE)
         assert runner.process.returncode == 6
         assert "was stopped by drivepanel stop, stop" in output
-        # the owner went, the recorder records on
+        # the owner exited, the recorder continues
         assert recorder.process.stdout is not None
         for _ in range(3):
             assert '"RFR"' in recorder.process.stdout.readline()

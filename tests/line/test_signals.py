@@ -135,7 +135,7 @@ def test_resumed_panel_reads_its_keys_once() -> None:
         os.kill(panel.pid, signal.SIGSTOP)
         wait_until(lambda: is_suspended(panel.pid), "suspended")
         mode = termios.tcgetattr(panel.terminal)
-        mode[3] |= termios.ICANON | termios.ECHO  # as a shell sets it that takes the terminal
+        mode[3] |= termios.ICANON | termios.ECHO  # as set by a shell that takes the terminal
         termios.tcsetattr(panel.terminal, termios.TCSANOW, mode)
         panel.cells.clear()
         os.kill(panel.pid, signal.SIGCONT)

@@ -68,7 +68,7 @@ def test_simulate_ends_normally_with_unread_output() -> None:
     with simulated("atv312@2", "--tcp", "0", stdin=subprocess.PIPE) as simulation:
         process = simulation.process
         assert process.stdin is not None
-        process.stdin.write("2: LI9=1\n" * 3000)  # its answers are more than a pipe takes
+        process.stdin.write("2: LI9=1\n" * 3000)  # its replies exceed the capacity of a pipe
         process.stdin.flush()
         assert process.stderr is not None
         pipe = process.stderr

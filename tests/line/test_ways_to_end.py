@@ -48,7 +48,7 @@ def running(start: Start, *options: str, family: str = "atv71") -> Iterator[Runn
         line = f"serial:{simulation.serve_pty()},19200,8N1"
         terminal = start([sys.executable, "-m", "tui", line, "-d", "1", *options])
         terminal.wait_for("STANDBY")
-        # one after another: keys that come at once are not taken
+        # one after another: keys that arrive together are ignored
         terminal.press("a")
         wait_until(lambda: "ARMED" in terminal.text().replace("NOT ARMED", ""), "it is armed")
         terminal.press("r")

@@ -126,7 +126,7 @@ async def test_due_stop_is_carried_out(bench: Bench) -> None:
     await come(lambda: guardian.busy)
     await bench.stopped(1)
     await come(lambda: not guardian.busy)
-    # all programs have heard of it before: it is not given once more
+    # all programs know of it already: it is not given again
     assert bench.line.facts.stops.stamp(1) == 0
     assert bench.turns(2)
 

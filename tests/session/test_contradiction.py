@@ -138,7 +138,7 @@ def test_contradicting_drive_is_never_armed(family: str) -> None:
     session = DriveSession(OneDrive({}), 1, library.load(family), identity)
     with pytest.raises(OrderRefused, match="says it is ATV312HU09M3, Altivar 312"):
         session.arming.arm()
-    # neither where its state is read first
+    # nor if its state is read first
     with pytest.raises(OrderRefused, match="the profile of another drive"):
         Commander(session, Journal()).arm()
     assert not session.arming.armed

@@ -107,14 +107,14 @@ def test_copy_during_the_next_request_is_not_a_second_drive() -> None:
              ECHO, ECHO, EVIDENCE, (ECHO, OLD), EVIDENCE, REPLY],
             {"behind": 3, "duplicated": 0},
         ),
-        # a copy that comes during the next request, whose own reply follows
+        # a copy that arrives during the next request, whose own reply follows
         ([EVIDENCE, REPLY, WIDE, (REPLY, OLD), LONG], {"behind": 0, "duplicated": 1}),
-        # the second drive's reply comes then, and the own one collides
+        # the second drive's reply arrives then, and the own one collides
         (
             [EVIDENCE, REPLY, WIDE, (OTHER, OLD), (LONG[:5], "noise")],
             {"behind": 0, "second": 1},
         ),
-        # a reply that comes during the next request after a time
+        # a reply that arrives during the next request after a delay
         ([EVIDENCE, *[b"\0"] * 20, WIDE, (REPLY, OLD), LONG], {"behind": 0}),
     ],
 )  # fmt: skip

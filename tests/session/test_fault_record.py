@@ -48,7 +48,7 @@ async def test_trip_records_values_and_writes_of_the_preceding_seconds() -> None
         assert commands == ["16#0006", "16#000F"]
         assert record.moments[-1].state == "fault ObF"
         await made.until(lambda: made.drive.fault is not None)
-        # what comes after belongs to the next trip
+        # later entries belong to the next trip
         assert recorder.latest is record
         recorder.acknowledge()
         assert recorder.seen

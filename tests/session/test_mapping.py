@@ -168,7 +168,7 @@ async def test_block_is_configured_then_pending_then_active() -> None:
         assert {s.verdict for s in view.slots} <= {SlotMatch.SAME, SlotMatch.MOVING}
         here.drive.set("F875", 2)
         here.drive.set("F876", 1)
-        # words in the drive are not what the block brings yet
+        # words in the drive are not yet those of the block
         await here.session.line.write(1, here.profile["F877"].address, [4])
         await here.session.line.write(1, here.profile["F878"].address, [3])
         view = await mapper.verify(read)

@@ -123,7 +123,7 @@ def test_replacement_for_an_assignment_is_reported() -> None:
         ("FE03", [(100, 100, 100)], SlotMatch.SAME),
         ("FE03", [(100, 101, 100)], SlotMatch.DIFFERS),
         ("FE03", [(100, 102, 104)], SlotMatch.MOVING),
-        ("FE03", [(104, 96, 100)], SlotMatch.MOVING),  # as far again as it went between them
+        ("FE03", [(104, 96, 100)], SlotMatch.MOVING),  # as far again as between them
         ("FE03", [(104, 95, 100)], SlotMatch.DIFFERS),
         ("FE03", [(100, 100, 100), (200, 200, 200)], SlotMatch.SAME),
         ("FE03", [(100, 100, 100), (200, 201, 200)], SlotMatch.MOVING),

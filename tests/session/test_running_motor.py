@@ -86,7 +86,7 @@ def leaving_raises(
     return pytest.raises(error, match=match)
 
 
-def stop_elsewhere(bench: MotorBench) -> None:
+def stop_by_another_program(bench: MotorBench) -> None:
     """Another program stops the motor: this one hears of it, and the drive gets its word."""
     stopped = DevicesStopped((1,), "drivepanel stop", Program("id", "stop", 4711))
     bench.line._calls.line.facts.events.emit(stopped)
@@ -410,7 +410,7 @@ def test_stop_by_another_program_is_reported_without_a_restart(
         bench.drive.running("20Hz") as motor,
     ):
         bench.wait_turning()
-        stop_elsewhere(bench)
+        stop_by_another_program(bench)
         wait_until(lambda: motor.ended != "", "the block may know", 20.0)
         with pytest.raises(NotArmed):
             bench.drive.write({"ACC": 5})
@@ -426,7 +426,7 @@ def test_stop_by_another_program_just_before_the_end_is_reported(bench: MotorBen
         bench.drive.running("20Hz"),
     ):
         bench.wait_turning()
-        stop_elsewhere(bench)
+        stop_by_another_program(bench)
     assert bench.stands
 
 

@@ -246,7 +246,7 @@ async def test_indirect_block_is_used_once_confirmed(start: Start) -> None:
     monitor.start(period=0.1)
     await until(lambda: bool(snapshots and snapshots[-1].block == "Read block"))
     assert monitor.reader.seconds(["FD01", "FD00", "FE03", "FE05", "FE90"]) > 0
-    # what is chosen now counts from the next reset on: the block goes on bringing the same
+    # the new assignment applies after the next reset: the block keeps returning the same
     for slot, raw in {"F875": 2, "F876": 1}.items():
         opened.line.facts.leases.arm(1, None, monitor.session.care())
         await opened.line.write(1, monitor.profile[slot].address, [raw])

@@ -166,7 +166,7 @@ async def test_values_have_their_time_on_the_wire(steady: Steady) -> None:
     snapshot = await steady.cycle()
     reading = snapshot.readings["SPEED"]
     assert time.monotonic() - reading.time >= 0.1
-    # a command that was given in between is not answered by it
+    # it does not answer a command given in between
     assert snapshot.time == reading.time
 
 

@@ -191,7 +191,7 @@ async def test_task_after_a_stop_runs_without_earlier_tasks(
     reported: Notified,
 ) -> None:
     reported.put("a")
-    # the stop comes before the loop had time to begin
+    # the stop arrives before the loop could begin
     reported.queue.stop()
     reported.arming.arm()
     reported.put("b")
@@ -302,7 +302,7 @@ async def test_permit_pauses_while_disarmed(reported: Notified) -> None:
 
 @pytest.mark.parametrize("end", ["stop", "disarm"])
 async def test_task_checks_its_permit_before_each_frame(reported: Notified, end: str) -> None:
-    # it sees the end itself, before the worker hears of being cancelled
+    # it detects the end itself, before the worker is cancelled
     reported.line.cancels_late = True
     frames: list[int] = []
 

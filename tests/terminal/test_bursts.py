@@ -296,7 +296,7 @@ def test_every_key_read_is_delivered_or_cancelled(reads: list[tuple[list[str], f
             assert key.name in STEPPING
             assert near.count(key.name) > 1
         assert key.stroke.steps <= (key.name in STEPPING or key.stroke.alone)
-    # a key that no stop came after is given out, alone where nothing is near
+    # a key without a later stop is delivered, as single if no other is close
     stops = [at for name, at in typed if name in STOPS]
     for name, at in typed:
         near = [other for other, time in typed if abs(time - at) <= BURST_GAP + 1e-6]

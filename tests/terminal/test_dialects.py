@@ -65,7 +65,7 @@ def test_function_key_in_one_read_is_that_key_or_none() -> None:
 def test_function_key_in_several_reads_is_that_key_or_none(gap: float) -> None:
     for sequence, key in FUNCTION_KEYS:
         for reads in cuts(sequence):
-            # an ESC that nothing followed in time is Escape, whatever comes then
+            # an ESC without a following byte in time is Escape, whatever follows later
             late = ["escape"] if gap > ESCAPE_DELAY and reads[0] == "\x1b" else []
             found = names(tokens(reads, gap))
             assert found == [*late, key] or (key not in STOPS and found == late), (key, reads)
@@ -171,7 +171,7 @@ SENT_BEFORE = [*REPLIES.values(), *REPORTS.values(), "\x9d11;rgb:0/1\x9c", "\x90
 
 @pytest.mark.parametrize("reply", SENT_BEFORE)
 def test_stop_key_after_a_cut_or_incomplete_reply_stops(reply: str) -> None:
-    """The end of a report, a backslash, is lost or late: ESC and the ESC of F12 are no key."""
+    """A lost or late backslash at the end of a report: ESC and the ESC of F12 form no key."""
     for kept in sorted({len(reply) - lost for lost in range(4)} | {1, 2, 3}):
         for stop, key in STOP_SEQUENCES.items():
             whole = reply[:kept] + stop

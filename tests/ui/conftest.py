@@ -13,7 +13,7 @@ from textual.widgets import Input
 
 from tui.screens.dialogs.question import Question
 
-from .quick import drawn_for_somebody, parse_once, wait_for_the_busy
+from .quick import drawn_for_a_person, parse_once, wait_for_the_busy
 
 
 @pytest.fixture(autouse=True)
@@ -60,7 +60,7 @@ def drawn_when_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest.Mon
     """
     looked_at = "snap_compare" in request.fixturenames or request.node.get_closest_marker("drawn")
     if not looked_at:
-        monkeypatch.setattr(Compositor, "render_update", drawn_for_somebody)
+        monkeypatch.setattr(Compositor, "render_update", drawn_for_a_person)
 
 
 @pytest.fixture(autouse=True)

@@ -26,7 +26,7 @@ def parse_once(sheet: Stylesheet, *source: Any, **how: Any) -> Any:
     return _parsed[key]
 
 
-def drawn_for_somebody(
+def drawn_for_a_person(
     self: Compositor,
     full: bool = False,
     screen_stack: list[Screen[Any]] | None = None,

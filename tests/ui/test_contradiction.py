@@ -37,7 +37,7 @@ async def test_drive_with_a_contradicting_profile_is_not_armed() -> None:
         console = app.connection.found[1].console
         assert console is not None
         assert console.commander.armed_for is None
-        # its own profile, and it is armed as ever
+        # its own profile, and it is armed as usual
         await pilot.press("1")
         await until(pilot, lambda: app.screen is app.connection)
         field.value = ""

@@ -75,7 +75,7 @@ async def test_closed_line_is_monitored_and_released() -> None:
             await pilot.press("H")
             await heard(app, pilot, peer)
             assert "listening" in shown(app, "strip")
-            # who commands, and by what margin
+            # the commander, and the margin
             await pilot.press("tab", "tab")
             await until(pilot, lambda: "Device 6: Altivar 71" in shown(app, "frames"))
             page = " ".join(shown(app, "frames").split())
@@ -89,7 +89,7 @@ async def test_closed_line_is_monitored_and_released() -> None:
             await until(pilot, lambda: app.screen is app.connection)
             assert not app.hearing
             assert peer.requests == []
-            # the port is free again at once
+            # the port is free again immediately
             await pilot.press("H")
             await until(pilot, lambda: isinstance(app.screen, HeardScreen))
             await pilot.press("1")
@@ -191,7 +191,7 @@ async def test_monitoring_pauses_polling_after_confirmation() -> None:
         assert app.panel_lines
         await pilot.press("H")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
-        await pilot.pause(0.4)  # a yes counts once the question has stood
+        await pilot.pause(0.4)  # a yes counts once the question has been open long enough
         await pilot.press("y")
         await heard(app, pilot, peer)
         requested = len(peer.requests)

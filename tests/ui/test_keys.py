@@ -332,7 +332,7 @@ async def back_to(made: Bench, screen: str) -> None:
     if app.place == CONNECTION:
         app.connection.drives.focus()  # in a field a letter is text
         if screen == CONNECTION:
-            assert not console.session.arming.armed  # who leaves Monitor for it has disarmed
+            assert not console.session.arming.armed  # leaving Monitor for it disarms
             return
     if app.place == screen and console.session.arming.armed:
         return
@@ -355,7 +355,7 @@ async def back_to(made: Bench, screen: str) -> None:
     await until(made.pilot, lambda: app.place == screen)
 
 
-# Keys that do not wait until it is known whether they came alone
+# Keys that act before they are known to be single
 
 SHOW_EVERYWHERE = {*"1234567", *"&é\"'(è", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l"}
 ARROWS = {"up", "down", "pageup", "pagedown"}

@@ -146,7 +146,7 @@ async def test_typing_into_a_field_changes_no_screen() -> None:
         profile.focus()
         await until(pilot, lambda: app.connection.drives.option_count == 2)
         assert profile.has_focus
-        # nor who went back to the lines
+        # nor a person who returned to the lines
         app.connection.lines.focus()
         app.connection.show_drives()
         await pilot.pause()
@@ -206,7 +206,7 @@ async def test_cursor_stays_on_its_drive_not_its_row() -> None:
         listed.fill(*lines(1, 2, 4, 5, 7))
         assert [option.id for option in listed.options] == ["1", "2", "4", "5", "7"]
         assert listed.chosen == 7
-        # a drive that is gone leaves the first one
+        # the first drive is selected if the selected one disappears
         listed.fill(*lines(1, 2))
         assert listed.chosen == 1
         await pilot.pause()

@@ -128,7 +128,7 @@ async def test_space_is_text_again_after_a_pending_key_is_handled() -> None:
         await until(pilot, lambda: isinstance(app.focused, Input))
         await asyncio.sleep(Ask.SETTLED)
         key, read_at = Key("enter", "\r"), time.monotonic()
-        assert app.take_stop_key("space", read_at)  # Enter may close the text yet
+        assert app.take_stop_key("space", read_at)  # Enter may still close the text
         attach(key, Stroke(read_at, app.stop_stamp()))
         app.post_message(key)
         await until(pilot, lambda: not app.take_stop_key("space", read_at))
@@ -146,11 +146,11 @@ async def test_stop_cancels_a_key_in_processing(
         await until(pilot, lambda: bool(app.connection.query("#lines")))
         before = PanelScreen.on_key
 
-        def stopped_meanwhile(screen: PanelScreen, event: Key) -> None:
+        def stopped_during_the_key(screen: PanelScreen, event: Key) -> None:
             app.take_stop_key("f12")
             before(screen, event)
 
-        for on_key, expected in ((stopped_meanwhile, []), (before, ["help"])):
+        for on_key, expected in ((stopped_during_the_key, []), (before, ["help"])):
             monkeypatch.setattr(PanelScreen, "on_key", on_key)
             key = Key("question_mark", "?")
             attach(key, Stroke(time.monotonic(), app.stop_stamp()))
@@ -215,7 +215,7 @@ async def test_stop_while_arming_leaves_the_drive_disarmed(
         goes_on, stops = getattr(kind, name), iter(["f12"])
 
         def behind_a_stop(*given: Any, **named: Any) -> Any:
-            # what is drawn asks who commands, too, and may do so before the key
+            # drawing reads the commander, too, and may do so before the key
             if sys._getframe(1).f_code.co_name == "action_arm":
                 for key in stops:
                     made.app.take_stop_key(key)
@@ -279,7 +279,7 @@ async def test_error_after_a_stop_key_does_not_prevent_its_frame(
                     await asyncio.sleep(0.0 if writes(made.app, before) else 0.05)
                 if not writes(made.app, before):
                     missing.append(f"{place}, {key!r}")
-                # a stop whose frame was not answered yet is not begun again by the next key
+                # a stop without a reply to its frame is not restarted by the next key
                 await until(made.pilot, lambda: not waiting(made.app))
         assert not missing
 
