@@ -25,7 +25,7 @@ Script = Callable[[bytes, int], Sequence[Step]]
 
 
 def honest_pdu(pdu: bytes) -> bytes:
-    """The right answer of a drive whose every register holds its own address."""
+    """Correct reply of a drive whose every register contains its own address."""
     address, count = int.from_bytes(pdu[1:3], "big"), int.from_bytes(pdu[3:5], "big")
     match pdu[0]:
         case 3 | 23:
@@ -45,7 +45,7 @@ def reply(request: bytes) -> bytes:
 
 
 def honest(request: bytes, _count: int) -> Sequence[Step]:
-    """Answer every request at once and correctly, except broadcasts."""
+    """Answer every request immediately and correctly, except broadcasts."""
     return [reply(request)] if request[0] else []
 
 

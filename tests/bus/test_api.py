@@ -37,7 +37,7 @@ IDENTITY = {0: b"none"}
 
 @dataclass
 class End:
-    """A line with one device that is there, and what went over the wire."""
+    """A line with one existing device, and the frames on the wire."""
 
     line: ModbusLine
     sent: Callable[[], list[bytes]]

@@ -32,7 +32,7 @@ class Bench:
         self.queue.put(Job(Read(1, 1, 1), priority, CAUTIOUS, program=program, requested=at))
 
     def work(self) -> float | None:
-        """Send what may be sent; returns when the next may, if nothing was."""
+        """Send a due request; if none is due, return the time of the next."""
         job, ready = self.queue.take(self.line.not_before, self.now)
         if job is None:
             return ready
@@ -54,7 +54,7 @@ class Bench:
                 assert self.work() is None
 
     def wait(self, pause: float) -> None:
-        """Let time go by, in which a poll may go out."""
+        """Advance the time, in which a poll may be sent."""
         end = self.now + pause
         while self.now < end:
             waiting = len(self.sent)

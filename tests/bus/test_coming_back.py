@@ -11,7 +11,7 @@ from tui.bus.share.heartbeat import BACK_LOOK, programs_back
 
 
 class StarvedLoop:
-    """A loop whose timers come so much later than they are due."""
+    """A loop whose timers run late by this time."""
 
     def __init__(self, late: float) -> None:
         self.late = late
@@ -21,7 +21,7 @@ class StarvedLoop:
         self.now += seconds + self.late
 
     def waited(self, *, greets: bool = False) -> float:
-        """Seconds after which programs that are not back count as gone."""
+        """Seconds after which programs that have not reconnected count as gone."""
         asyncio.run(programs_back(lambda: greets, lambda: self.now, self.pause))
         return self.now
 

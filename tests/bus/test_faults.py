@@ -1,4 +1,4 @@
-"""Faults of a serial line: what the plain client makes of each, and what the line makes of it."""
+"""Faults of a serial line, with the plain client and with the line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LATE = 0.35
 
 
 def first_late(request: bytes, count: int) -> Sequence[Step]:
-    """Answer the first request too late, the others at once."""
+    """Answer the first request too late, the others immediately."""
     return [LATE, reply(request)] if count == 0 else [reply(request)]
 
 
@@ -442,7 +442,7 @@ async def test_gap_between_frames_is_kept(open_line: OpenLine) -> None:
 
 
 def _pauses(peer: PtyPeer) -> list[float]:
-    """Seconds between each sending of the peer and the request that came next."""
+    """Seconds between each reply of the peer and the next request."""
     following = peer.arrivals[1:]
     return [came - left for left, came in zip(peer.departures, following, strict=False)]
 

@@ -1,4 +1,4 @@
-"""Modbus TCP for others: requests taken apart strictly, and answers that keep their transaction."""
+"""Modbus TCP server: requests parsed strictly, and replies that keep their transaction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The heartbeat of a program on a line: by a thread of its own, as long as its loop turns."""
+"""Heartbeat of a program on a line: sent by its own thread while its loop runs."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ async def test_reply_counts_after_a_pause_in_sending_that_is_no_suspension() -> 
 
 
 async def test_bytes_received_while_suspended_in_sending_are_not_a_reply() -> None:
-    """Frozen between its look at the line and the request: an answer of before is there first."""
+    """Frozen between its read of the line and the request: an earlier reply is already there."""
     strays: list[Piece] = []
     transport = CommandBlocked(b"")
     around = context(strays)
@@ -147,7 +147,7 @@ async def test_bytes_before_a_request_with_a_guessed_transaction_are_not_a_reply
 
 
 class Taker:
-    """Keeps what a transport hands over."""
+    """Collects the bytes that a transport delivers."""
 
     def __init__(self) -> None:
         self.data = b""
@@ -255,7 +255,9 @@ FLOODS = {
 @pytest.mark.timeout(60)
 @pytest.mark.parametrize("name", FLOODS)
 async def test_requests_end_on_a_line_that_never_pauses(name: str, open_line: OpenLine) -> None:
-    """Before, the search for a reply in all that came held the line's loop up for minutes."""
+    """Before, the search for a reply in all received bytes blocked the loop of the line for
+    minutes.
+    """
     link, junk, pause = FLOODS[name]
     with flooding(junk, pause) as port:
         line = open_line(link(port), BRISK, wait=None)

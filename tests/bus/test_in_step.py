@@ -40,7 +40,7 @@ LIMITS = {"echo": WIDE, "no echo": NO_ECHO, "single words": SINGLE, "silent": SI
 
 
 class Behind:
-    """A converter that holds each reply until so many more requests have come."""
+    """A converter that holds each reply until this many further requests have arrived."""
 
     def __init__(self, held: int = 1) -> None:
         self.held = held
@@ -59,7 +59,7 @@ class Behind:
 
 
 async def values(line: Line, count: int, seconds: float = 15.0) -> list[tuple[int, int]]:
-    """Registers that were read, with their values; in turn, for so many tries."""
+    """Registers read, with their values; in turn, for this many tries."""
     found = []
     async with asyncio.timeout(seconds):
         for at in range(count):

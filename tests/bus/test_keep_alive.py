@@ -33,7 +33,7 @@ ONE = KeepAlive(1, TIMEOUT, ADDRESS)
 
 
 class Bench:
-    """The reads of one line as time goes by; each is answered, or fails, at once."""
+    """Reads of one line as time passes; each is answered, or fails, immediately."""
 
     def __init__(self) -> None:
         self.now = 1000.0

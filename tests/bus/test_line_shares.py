@@ -29,7 +29,7 @@ EXCHANGE = 0.03
 
 
 class TimedLine:
-    """A dispatcher with a master whose exchanges move the clock, until the time is up."""
+    """A dispatcher with a master whose exchanges advance the clock, until the time is up."""
 
     def __init__(self) -> None:
         self.failure: LineLost | None = None
@@ -62,13 +62,13 @@ class TimedLine:
     def keep_asking(
         self, priority: Priority, program: str = "a", count: int = 4, word: int | None = None
     ) -> None:
-        """Have so many requests wait at any time."""
+        """Keep this many requests waiting."""
         for device in range(1, count + 1):
             self._again.append((priority, program, device, word))
             self.ask(priority, program, device, word)
 
     async def quiet(self) -> None:
-        """End what is served once the time is up."""
+        """End the current exchange once the time is up."""
         if self.now >= self.end:
             raise LineLost("the time is up")
 
@@ -289,7 +289,7 @@ async def test_stop_in_the_silence_before_a_request_leaves_stops_reads_and_other
 
 
 async def test_command_that_is_held_back_at_the_last_moment_is_sent_later() -> None:
-    """A program that was suspended first hears of the stops of the others."""
+    """A program that was suspended first gets the stops of the others."""
     line = TimedLine()
     until = line.now + 0.1
 

@@ -1,4 +1,4 @@
-"""The last minute of a line and of its devices: what counts as lost, and whose trouble it is."""
+"""Last minute of a line and its devices: what counts as lost, and for which of them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Ended:
         self._outcomes.conclude(job, ExchangeResult(kind, pdu, sent=self.now, end=self.now))
 
     def good(self, device: int, times: int = 1) -> None:
-        """So many good replies."""
+        """Count this many good replies."""
         for _ in range(times):
             self.reply(device, ResultKind.REPLY)
 
@@ -50,7 +50,7 @@ class Ended:
         self._outcomes.count_beside(device, ExchangeResult(ResultKind.REPLY, end=self.now))
 
     def missed(self, device: int, times: int = 1, priority: Priority = Priority.POLL) -> None:
-        """So many requests without an answer."""
+        """Count this many requests without a reply."""
         for _ in range(times):
             self.reply(device, ResultKind.NOTHING, priority)
 

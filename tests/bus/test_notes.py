@@ -1,4 +1,4 @@
-"""Notes for the next program on a line: kept for some time, within bounds, given to who asks."""
+"""Notes for the next program on a line: kept for some time, within bounds, sent on request."""
 
 from __future__ import annotations
 

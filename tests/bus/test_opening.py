@@ -1,4 +1,4 @@
-"""A serial port that the system takes long to open: the loop of its line goes on."""
+"""A serial port that opens slowly: the loop of its line keeps running."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ class MadeUpProcess:
 
 
 class Bench:
-    """A program on a line that looks at the line's keeper as time goes by."""
+    """A program on a line that checks the keeper of the line as time passes."""
 
     def __init__(self) -> None:
         self.now = 100.0

@@ -52,7 +52,7 @@ MUTATED = 100_000
 
 
 async def stop_of(data: bytes) -> tuple[int, ...]:
-    """The devices that are stopped by what a program sends after the head."""
+    """Devices that a message of a program stops after the head."""
     reader = asyncio.StreamReader()
     reader.feed_data(data)
     reader.feed_eof()
@@ -60,7 +60,7 @@ async def stop_of(data: bytes) -> tuple[int, ...]:
 
 
 def heard_by(line: Line) -> list[Stop]:
-    """The stops of others that a program hears of from now on."""
+    """Later stops by others that a program gets."""
     heard: list[Stop] = []
     on_event(
         line.facts,

@@ -275,7 +275,7 @@ async def test_plan_beyond_the_limits_of_its_device_is_refused(share: Share) -> 
 
 
 class Stub:
-    """A program that is attached, and hears."""
+    """An attached program that reads its messages."""
 
     program = Program("stub", "stub")
     limits: ClassVar = {1: CAUTIOUS}
@@ -389,7 +389,7 @@ async def test_owner_that_does_not_answer_loses_the_plan(share: Share) -> None:
 
 
 def costs(owner: Line, count: int) -> float:
-    """Seconds of a read of so many words."""
+    """Seconds of a read of this many words."""
     return float(served(owner)._share(1, {PlannedRead(0, count): 1.0}))
 
 

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="no ports like these 
 
 
 def counting(*readings: PortErrors) -> Iterator[PortErrors]:
-    """A port whose counts are these, the last one for good."""
+    """A port with these counts in turn; the last one stays."""
     yield from readings
     while True:
         yield readings[-1]

@@ -101,7 +101,7 @@ async def test_attached_programs_and_a_look_get_the_shares(share: Share) -> None
 
 
 def clients(lines: SharedLines) -> LineLook:
-    """The answer to a program that looks at the line."""
+    """Answer to a program that looks at the line."""
     (lock,) = (lines.folder / "lines").glob("*.lock")
     owner = owner_of_lock(lock)
     assert owner is not None

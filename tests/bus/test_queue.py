@@ -333,7 +333,7 @@ def test_new_owner_knows_that_line_repeats_replies(devices: Devices) -> None:
 
 
 def test_wait_for_a_copy_exceeds_the_previous_gap(devices: Devices) -> None:
-    """An adapter hands over in lumps: a copy was 4 ms behind its reply, the next one 16."""
+    """An adapter delivers in lumps: a copy was 4 ms after its reply, the next one 16."""
     devices.answered(1, EXPECTED, 0.01, 10.0)
     assert devices.stray(LATE, 10.004)
     devices.answered(1, EXPECTED, 0.01, 11.0)

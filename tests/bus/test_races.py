@@ -1,4 +1,4 @@
-"""Two threads at once: what one of them checks is still so when it acts on it."""
+"""Two threads at the same time: a checked condition still holds when one acts on it."""
 
 from __future__ import annotations
 

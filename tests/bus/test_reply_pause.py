@@ -1,4 +1,4 @@
-"""A reply that comes in single characters costs the loop a few turns, not one for each."""
+"""A reply that arrives in single characters costs the loop a few turns, not one for each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Requests: their bytes, what their replies must be, and what is never sent."""
+"""Requests: their bytes, their replies, and requests that are never sent."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several programs on one line: what each asks goes out in one order, one exchange at a time."""
+"""Several programs on one line: requests are sent in one order, one exchange at a time."""
 
 from __future__ import annotations
 

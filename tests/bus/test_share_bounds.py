@@ -129,7 +129,7 @@ def test_wrapped_stop_count_is_still_new_to_others() -> None:
 
 
 def test_stop_count_raised_by_others_is_corrected_by_its_program() -> None:
-    """Else its next stop would be no news, and what waits would go out after it."""
+    """Otherwise its next stop would not be new, and waiting writes would be sent after it."""
     owner = StopCounts()
     owner.learn_greeting("liar", {1: {"run": 1000}}, ["panel", "liar"])
     before = owner.stamp(1)

@@ -41,7 +41,7 @@ NOT_ENDED = r"does not answer\. End that program \(kill -9 \d+\)"
 
 
 async def send_stop(line: Line, device: int) -> float:
-    """A stop key on a line whose owner may be frozen: without a look."""
+    """A stop key on a line whose owner may be frozen: without a read."""
     line.facts.give_stop([device], "the stop key")
     return await line.write(device, 1, [STOP], priority=Priority.STOP)
 

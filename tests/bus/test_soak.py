@@ -1,4 +1,4 @@
-"""All faults at once, at random: requests may fail, but none gets another's answer."""
+"""All faults together, at random: requests may fail, but none gets the reply to another."""
 
 from __future__ import annotations
 

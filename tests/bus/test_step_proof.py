@@ -1,4 +1,4 @@
-"""After a holder of the line was killed: late replies to it are never taken for others."""
+"""A line whose holder was killed: late replies to it are never taken for other replies."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ async def killed_while_it_waits(owner: OtherProgram, peer: PtyPeer) -> float:
 
 
 def next_program(share: Share, peer: PtyPeer, limits: Limits, patience: float = 1.5) -> Line:
-    """A program that comes after it, and waits so many seconds for a reply."""
+    """A program that opens the line after it, and waits this many seconds for a reply."""
     timing = replace(QUICK, late_reply=LATE, first_timeout=patience, min_timeout=patience)
     line = share(peer.path).open("watch", timing=timing)
     line.describe(1, limits)
@@ -100,7 +100,7 @@ def busy_once(request: bytes, count: int) -> Sequence[Step]:
 
 
 def doubting(open_line: OpenLine, peer: PtyPeer, seconds: float) -> Line:
-    """A line whose last holder was killed: a late reply may come for so many seconds."""
+    """A line whose last holder was killed: a late reply may arrive for this many seconds."""
     timing = replace(QUICK, late_reply=LATE, first_timeout=0.2, min_timeout=0.2)
     line = open_line(peer.path, timing)
     line._engine._dispatcher.proof.doubt(time.monotonic() + seconds)

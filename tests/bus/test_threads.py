@@ -1,4 +1,4 @@
-"""One line used from many threads and loops at once."""
+"""One line used by many threads and loops at the same time."""
 
 from __future__ import annotations
 

@@ -42,7 +42,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def run(folder: Path, *words: str, **variables: str) -> subprocess.CompletedProcess[str]:
-    """Run Python in a folder, whose package goes before the installed one."""
+    """Run Python in a folder whose package overrides the installed one."""
     return subprocess.run(
         [sys.executable, *words],
         cwd=folder, env={**os.environ, **variables}, capture_output=True, text=True,

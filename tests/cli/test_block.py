@@ -1,4 +1,4 @@
-"""Indirect blocks and scanner on the command line: what is printed, written, and the statuses."""
+"""Indirect blocks and scanner on the command line: output, writes, and exit statuses."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def line() -> Iterator[str]:
 
 
 def run(status: int, *arguments: str | Path) -> str:
-    """Run `block` to this exit status; what it prints on standard output."""
+    """Run `block` to this exit status; return its standard output."""
     return commands.run(status, "block", *arguments)
 
 

@@ -1,4 +1,4 @@
-"""`drivepanel bundle`: what is in it, on a good line and on a dead one, and what never is."""
+"""`drivepanel bundle`: its content, on a good line and on a dead one, and what it never has."""
 
 from __future__ import annotations
 

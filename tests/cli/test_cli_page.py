@@ -54,7 +54,7 @@ EXAMPLES = {
 LONG = {
     "run", "hold", "simulate", "serve", "prove", "listen", "scan", "backup", "bundle", "restore",
 }  # fmt: skip
-"""Commands that take a while and have tests of their own: their examples are for the sweeps."""
+"""Slow commands with their own tests: their examples are for the sweeps."""
 SHORT = [text for text in EXAMPLES.values() if not LONG & {*commands_of(text)}]
 
 

@@ -1,4 +1,4 @@
-"""`drivepanel counters`: what it prints, its status, and what it does not do."""
+"""`drivepanel counters`: its output, its status, and its limits."""
 
 from __future__ import annotations
 

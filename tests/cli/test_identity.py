@@ -1,4 +1,4 @@
-"""A profile named by -p, against what the drive says of itself."""
+"""A profile named by -p, against the identification of the drive."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`drivepanel journal`: what was written, of which drive, since when."""
+"""`drivepanel journal`: writes, by drive and time."""
 
 from __future__ import annotations
 

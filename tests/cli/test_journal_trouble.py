@@ -1,4 +1,4 @@
-"""A journal that cannot be written is said at once, and keeps no command from ending well.
+"""An unwritable journal is reported immediately, and no command fails because of it.
 
 Nor do a full disk under the log and under standard output, and streams that are closed.
 """

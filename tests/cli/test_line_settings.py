@@ -1,4 +1,4 @@
-"""Baud and format of a line that names none, and what is said where nothing answers."""
+"""Baud and format of a line without settings, and the advice if no drive answers."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def test_line_without_a_profile_has_default_settings() -> None:
 
 @pytest.fixture
 def slow_family() -> str:
-    """A profile whose drives leave the factory at 9600 8N2."""
+    """A profile whose drives have 9600 8N2 as factory setting."""
     folder = library.user_folder()
     folder.mkdir(parents=True)
     text = (library.packaged_folder() / "atv312.toml").read_text("utf-8")

@@ -1,4 +1,4 @@
-"""`drivepanel listen`: what it prints and writes, on a line that a PLC of ours asks."""
+"""`drivepanel listen`: its output and files, on a line polled by a simulated PLC."""
 
 from __future__ import annotations
 

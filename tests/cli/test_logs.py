@@ -57,7 +57,7 @@ def test_log_handler_covers_every_module() -> None:
 
 
 def test_hung_disk_does_not_block_logging() -> None:
-    """A stop logs what it does: in the thread of the keys, and in that of the line."""
+    """A stop logs its actions: in the thread of the keys, and in that of the line."""
     log_file().parent.mkdir(parents=True, exist_ok=True)
     os.mkfifo(log_file())  # opening it blocks until a program reads it
     start_logging(0)

@@ -254,6 +254,6 @@ async def test_idle_connections_do_not_block_others(served: int) -> None:
 async def test_request_with_another_host_name_is_refused(
     served: int, host: bytes, status: int
 ) -> None:
-    """A web page in a browser of this network could read them under a name of its own."""
+    """A web page in a browser of this network could read them under another host name."""
     answer = await requested(served, b"GET /metrics HTTP/1.1\r\nhost: " + host + b"\r\n\r\n")
     assert answer.startswith(b"HTTP/1.1 %d " % status)

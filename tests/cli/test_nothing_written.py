@@ -58,7 +58,7 @@ def counted(
 
 
 class Refused(NamedTuple):
-    """A command that is refused, with what it says."""
+    """A refused command, with its message."""
 
     family: str
     words: tuple[str, ...]
@@ -136,7 +136,7 @@ MAIN = (
     "run at a reference, interlock", "reference above a limit", "run, another scale",
     "write, motor runs", "run, read-only", "reset, no fault", "another family", "run, not armed",
 )  # fmt: skip
-"""The refusals outside the sweeps; each is a program of its own."""
+"""The refusals outside the sweeps; each is a separate process."""
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""`status` and `run` say the same of who commands a drive, and name what opens the way."""
+"""`status` and `run` agree on the command source of a drive, and name the way to command it."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from tui.session.connect.open_line import open_line
 
 
 class FakePanel:
-    """Stands for the panel; remembers what it was given."""
+    """Replaces the panel; records its arguments."""
 
     given: dict[str, Any]
     ends_with = 0

@@ -28,7 +28,7 @@ def test_patience_is_longer_on_a_slow_line() -> None:
 async def test_timeout_learned_late_does_not_fail_status(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """Beside a panel at 1200 baud status ended with "TTO is set and could not be learnt"."""
+    """Beside a panel at 1200 baud, status ended with "TTO is set and could not be learnt"."""
     monkeypatch.setattr("tui.session.running.watching.LEARNT_WITHIN", 0.0)
     session = SimpleNamespace(
         profile=library.load("atv71"), line=line_to(SerialLink("x", 1200, "8E1"))

@@ -1,4 +1,4 @@
-"""Drives that are read for the plant: those that are away cost the others little, and come back."""
+"""Drives read for the plant: absent ones cost the others little, and are read again later."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Bench:
         return seen.cycle is not None and not seen.error
 
     def requested(self, device: int) -> int:
-        """Requests that went out to a device."""
+        """Requests sent to a device."""
         counted = self.opened.line.counters.devices.get(device)
         return counted.requests if counted is not None else 0
 

@@ -1,4 +1,4 @@
-"""`drivepanel scan`: it listens, asks each address once, shows who answers, and writes nothing."""
+"""`drivepanel scan`: it listens, probes each address once, shows the drives, and writes nothing."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def busy_machine(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @contextmanager
 def drives(*specs: DriveSpec) -> Iterator[PtyPeer]:
-    """Simulated drives behind a peer that keeps every request."""
+    """Simulated drives behind a peer that records every request."""
     simulation = Simulation(list(specs), any_settings=True)
 
     def script(request: bytes, _count: int) -> Sequence[Step]:
@@ -180,7 +180,7 @@ def test_two_drives_at_one_address_are_reported_as_unclear() -> None:
 
 
 def test_damaged_identification_is_unclear_without_a_family() -> None:
-    """An Altivar that answers the read by which others are found; its name comes damaged."""
+    """An Altivar that answers the probe for other families; its identification is damaged."""
 
     def script(request: bytes, _count: int) -> Sequence[Step]:
         if request[0] != 3:
@@ -317,7 +317,7 @@ def test_ctrl_c_keeps_the_hits() -> None:
 
 @contextmanager
 def at_a_terminal(*arguments: str) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
-    """A command whose person is at a terminal, and the handle of that; JSON goes to a pipe."""
+    """A command with a person at a terminal, and the handle of that; JSON goes to a pipe."""
     near, far = pty.openpty()
     tty.setraw(near)
     process = subprocess.Popen(

@@ -1,4 +1,4 @@
-"""`drivepanel serve`: what it refuses before it serves anything."""
+"""`drivepanel serve`: its refusals before it serves anything."""
 
 from __future__ import annotations
 

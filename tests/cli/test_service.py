@@ -92,7 +92,7 @@ def test_unit_matches_the_program() -> None:
 
 
 def test_unit_allows_the_socket_to_belong_to_its_group() -> None:
-    """A call that systemd does not let through killed the program before it was ready."""
+    """A call that systemd forbids killed the program before it was ready."""
     lines = (UNITS / "drivepanel.service").read_text("utf-8").splitlines()
     filters = [line.partition("=")[2] for line in lines if line.startswith("SystemCallFilter=")]
     # @chown is one of @privileged; what comes later counts

@@ -1,4 +1,4 @@
-"""The shot in front of `drivepanel stop`: it takes what the command takes, or nothing."""
+"""The short stop before `drivepanel stop`: it parses like the command, or does nothing."""
 
 from __future__ import annotations
 

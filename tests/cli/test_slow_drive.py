@@ -1,4 +1,4 @@
-"""A drive whose replies come after the timeout: commands name it as `why` does."""
+"""A drive whose replies arrive after the timeout: commands report it as `why` does."""
 
 from __future__ import annotations
 

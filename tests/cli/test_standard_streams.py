@@ -1,4 +1,4 @@
-"""Standard output and error of a command: a reader that went away is reported on one only."""
+"""Standard output and error of a command: a closed reader is reported on one only."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ def named() -> Iterator[tuple[str, str]]:
 
 
 def listed(text: str) -> list[dict[str, Any]]:
-    """The list of an output, whose documents fit the schema."""
+    """The list of an output; its documents fit the schema."""
     found: list[dict[str, Any]] = json.loads(text)
     for row in found:
         form_of(row)

@@ -1,4 +1,4 @@
-"""`status` on a line that loses answers: shows what is known, and marks what is not."""
+"""`status` on a line that loses replies: known values are shown, others marked."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ TIMEOUT_WORD = 6005
 def lose(
     monkeypatch: pytest.MonkeyPatch, register: int, seconds: float, *, answered: int = 0
 ) -> None:
-    """Let each read of a register end without an answer after so many seconds.
+    """Let each read of a register end without a reply after this many seconds.
 
     All but the first `answered` ones of each line.
     """

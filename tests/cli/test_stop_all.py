@@ -1,4 +1,4 @@
-"""`drivepanel stop --all` beside other programs on the line."""
+"""`drivepanel stop --all` while other programs use the line."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ async def stop_of(line: FakeLine, patience: Priority) -> str:
 
 
 def with_drive(damaged: float) -> FakeLine:
-    """A line with an Altivar 71 whose first answers are damaged."""
+    """A line with an Altivar 71 whose first replies are damaged."""
     line = FakeLine({1: {3201: 0x0250}})
     line.devices[1].identity = {0: b"Telemecanique", 1: b"ATV71HU15M3", 2: b"V1.0"}
     line.fail_identify(1, ChecksumFault(1, 43, 0, received=b""), times=damaged)

@@ -17,7 +17,7 @@ TEXT = "The bytes of each word of device 2 arrive swapped"
 
 @pytest.fixture
 def line() -> Iterator[str]:
-    """An Altivar 71 at address 2 behind a gateway that swaps."""
+    """An Altivar 71 at address 2 behind a gateway that swaps bytes."""
     with tcp_line("atv71@2", "--line-fault", "swapped=1") as text:
         yield text
 

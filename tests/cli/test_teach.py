@@ -1,4 +1,4 @@
-"""`drivepanel teach`, and running a drive by what was taught of it."""
+"""`drivepanel teach`, and running a drive with its learned scales."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def line() -> Iterator[str]:
 
 
 def teach(line: str, *arguments: str, status: int = 0) -> str:
-    """The command, and what it says on standard output."""
+    """Run the command; return its standard output."""
     return run(status, "teach", line, *DRIVE, *arguments)
 
 

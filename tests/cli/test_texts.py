@@ -33,7 +33,7 @@ def tame(text: str) -> bool:
 
 @pytest.fixture
 def line() -> Iterator[str]:
-    """A drive that calls itself what no drive should."""
+    """A drive with control characters in its name."""
     simulation = Simulation([DriveSpec("atv71", 1, identity={0: NAME, 2: NAME, 6: NAME})])
     simulation.start()
     host, port = simulation.serve_tcp()

@@ -1,4 +1,4 @@
-"""A stop is the last word for a command, too, that was typed before it and came later."""
+"""A stop also cancels commands typed before it that start later."""
 
 from __future__ import annotations
 

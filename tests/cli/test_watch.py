@@ -1,4 +1,4 @@
-"""`drivepanel watch`: what is good, CSV files that are not lost, several drives."""
+"""`drivepanel watch`: good values, CSV files that are not lost, several drives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""`drivepanel watch` over several lines: where a value is from, what one line costs the others."""
+"""`drivepanel watch` over several lines: the line of each value, and the effect of one line on
+others.
+"""
 
 from __future__ import annotations
 

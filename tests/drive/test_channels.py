@@ -22,7 +22,7 @@ IDLE = {
     "LAC": 2, "ETA": 0x0240, "ETI": 0, "LRS3": 0, "CHCF": COMBINED, "COP": 0, "FLO": 0, "FLOC": 1,
     "rFC": FIRST, "Fr1": MODBUS, "Fr2": 0, "CCS": CCS_FIRST, "Cd1": TERMINALS, "Cd2": LINE,
 }  # fmt: skip
-"""An Altivar 31 or 312 as it comes on, set up for Modbus; no word was written yet."""
+"""An Altivar 31 or 312 after power-up, set up for Modbus; no word was written."""
 
 COMBINED_CASES = {
     "first channel": ({}, "Modbus", "Modbus"),

@@ -1,4 +1,4 @@
-"""The configurations of the manuals: which one a drive has, and what another would change."""
+"""Configurations of the manuals: the current one, and the changes to another."""
 
 from __future__ import annotations
 

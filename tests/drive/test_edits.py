@@ -1,4 +1,4 @@
-"""Staged edits: what is typed becomes what the drive holds, in an order that it can follow."""
+"""Staged edits: typed values become values of the drive, in an order that it accepts."""
 
 from __future__ import annotations
 
@@ -169,7 +169,7 @@ def test_settings_that_end_the_connection_are_known() -> None:
 
 
 class Cutting:
-    """A drive that cuts what is written to what limits it now."""
+    """A drive that clamps a written value to its current limits."""
 
     def __init__(self, profile: Profile, raws: Mapping[str, int]) -> None:
         self.profile, self.raws = profile, dict(raws)

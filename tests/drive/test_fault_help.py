@@ -67,7 +67,7 @@ def test_family_without_fault_numbers_has_one_help_for_any_trip() -> None:
 
 
 def own_drive(folder: Path, text: str, name: str = "mine") -> Path:
-    """A profile of one's own, with a help file beside it."""
+    """An own profile, with a help file next to it."""
     whole = (library.packaged_folder() / "atv312.toml").read_text("utf-8")
     path = folder / "mine.toml"
     path.write_text(whole.replace('id = "atv312"', f'id = "{name}"', 1), encoding="utf-8")

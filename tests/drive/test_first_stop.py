@@ -1,4 +1,4 @@
-"""The word that is sent before a drive has said what it is stops it, whatever it is."""
+"""The word sent before a drive is identified stops it, whatever its family."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The limits in force, what a list shows first, and what builds on a refused edit."""
+"""Limits in force, the order of a list, and edits that depend on a refused edit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Assignments of blocks and scanner: the manuals' examples byte for byte, and what always holds."""
+"""Assignments of blocks and scanner: examples of the manuals byte for byte, general properties."""
 
 from __future__ import annotations
 

@@ -155,7 +155,7 @@ def test_truncated_file_is_always_detected(share: float) -> None:
 
 
 def test_file_truncated_between_lines_is_always_detected() -> None:
-    """As a disk that was full leaves it: what is there is whole TOML."""
+    """As after a full disk: the existing part is valid TOML."""
     lines = small().splitlines(keepends=True)
     for count in range(len(lines) - 1):
         with pytest.raises(SetError):

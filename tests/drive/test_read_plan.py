@@ -205,7 +205,7 @@ def test_scanner_that_saves_no_time_is_not_used() -> None:
 def test_no_other_use_of_blocks_is_cheaper(
     slots: list[int], wanted: set[int], *, checked: bool
 ) -> None:
-    """Every part of the block, with the best direct reads of what it leaves."""
+    """Every part of the block, with the best direct reads of the rest."""
     block = SCANNER | {"effective": "at-once" if checked else "after-reset"}
     profile = profile_of([10, 11, 12, 20, 30, 40, 50, 2165, 2166, 2167], blocks=[block])
     known = {f"P{2165 + place}": raw for place, raw in enumerate(slots)}

@@ -1,4 +1,4 @@
-"""Search by the words of a technician: what comes first, in every family."""
+"""Search by the words of a technician: the first results, in every family."""
 
 from __future__ import annotations
 
@@ -154,7 +154,7 @@ def test_profile_of_another_make_has_the_shared_words() -> None:
 
 
 def own_folder(folder: Path, text: str) -> tuple[Path, Path]:
-    """Folders of profiles, the first with words of its own for the profile."""
+    """Folders of profiles; the first has its own words for the profile."""
     (folder / "search").mkdir()
     path = folder / "search" / f"{own_profile().id}.toml"
     path.write_text(text, encoding="utf-8")

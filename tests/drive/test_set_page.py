@@ -1,4 +1,4 @@
-"""The parameter set of docs/parameter-sets.md is one, and means what the page says."""
+"""The parameter set of docs/parameter-sets.md is valid, and means what the page says."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The profile of one drive: its family's, with what a person has taught of it."""
+"""Profile of one drive: that of its family, with learned scales."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The scale of a raw word from what the drive's own display shows beside it."""
+"""Scale of a raw word, from readings of the drive's own display."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""TOML that no person writes: refused with its line, and at once."""
+"""Unusual TOML: refused with its line, and immediately."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def test_impossible_toml_value_is_reported(value: str) -> None:
 @pytest.mark.parametrize("odd", ['["ACC"]', "{ a = 1 }", "[]", "1979-05-27"])
 @pytest.mark.parametrize("key", ["code", "id", "raw"])
 def test_row_with_an_invalid_name_is_reported(key: str, odd: str, tmp_path: Path) -> None:
-    """It hid every other profile behind a traceback."""
+    """The error hid every other profile behind a traceback."""
     text = (library.packaged_folder() / "varmeca.toml").read_text("utf-8")
     table = {"code": "parameters", "id": "sources", "raw": "faults.codes"}[key]
     path = tmp_path / "varmeca.toml"

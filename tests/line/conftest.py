@@ -133,7 +133,7 @@ def terminal_with(peer: Peer, tmp_path: Path) -> Iterator[Callable[[list[str]], 
 
 @pytest.fixture
 def second_terminal(peer: Peer, tmp_path: Path) -> Iterator[Callable[[list[str]], Terminal]]:
-    """The same beside it."""
+    """A second terminal."""
     yield from _terminals(peer("tmux", "tmux"), tmp_path / "tmux2")
 
 

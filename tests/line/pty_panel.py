@@ -198,7 +198,7 @@ class PtyPanel:
             raise AssertionError(f"{late}:\n{self.text()}") from None
 
     def settle(self, seconds: float = 0.6) -> None:
-        """Wait for the effect of typed keys; no sign marks its end.
+        """Wait for the effect of typed keys; nothing marks its end.
 
         On a busy computer the panel may not even have read it yet.
         """

@@ -52,7 +52,7 @@ class Terminal:
             raise AssertionError(f"{late}; the screen:\n{self.text()}") from None
 
     def client(self) -> int:
-        """Process id of what runs in it: the SSH client."""
+        """Process id of the program in it: the SSH client."""
         return int(self.run("display-message", "-p", "#{pane_pid}"))
 
 

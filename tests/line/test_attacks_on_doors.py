@@ -29,7 +29,7 @@ def connected(place: Place, host: str) -> socket.socket:
 
 
 def noise(place: Place, chance: Random) -> None:
-    """Bytes of any kind, and frames whose head or length is wrong; no write by chance."""
+    """Random bytes, and frames with a wrong header or length; never a write by chance."""
     with connected(place, "127.0.0.2") as client:
         for _ in range(20):
             pdu = bytes([chance.choice((0, 3, 4, 8, 43, 99))]) + chance.randbytes(

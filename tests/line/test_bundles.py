@@ -1,4 +1,4 @@
-"""Bundles beside other programs: their frames are in it, tshark reads it, a motor goes on."""
+"""Bundles while other programs use the line: with their frames, motor running, read by tshark."""
 
 from __future__ import annotations
 

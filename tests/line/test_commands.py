@@ -592,7 +592,7 @@ def test_stop_of_a_silent_drive_exits_with_3() -> None:
 def test_stop_of_several_sends_a_silent_drive_its_profile_word(
     way: tuple[str, ...],
 ) -> None:
-    """Its replies are lost, not what is sent to it."""
+    """Replies of the drive are lost, but not requests."""
     with bench(DriveSpec("atv312", 1, run_hz=20.0)) as (simulation, line):
         wait_until(lambda: turns(simulation), "the motor turns")
         silence(simulation)

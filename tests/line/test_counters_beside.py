@@ -1,4 +1,4 @@
-"""`drivepanel counters` beside a panel that runs, each a process of its own, on one line."""
+"""`drivepanel counters` and a running panel as separate processes on one line."""
 
 from __future__ import annotations
 

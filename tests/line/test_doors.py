@@ -20,7 +20,7 @@ DOORS = re.compile(
     r"(paho|aiomqtt|http|pymodbus\.server|tui\.bus\.gateway|tui\.session\.gateway|tui\.cli"
     r"|textual|rich|click)(\.|$)"
 )
-"""Modules of Modbus TCP, metrics and MQTT, and of what is shown."""
+"""Modules of Modbus TCP, metrics and MQTT, and of the screens."""
 AT_EXIT = """
 import atexit, os, sys
 if "tui.keeper" in sys.orig_argv:

@@ -192,7 +192,7 @@ def test_narrow_terminal_cuts_names_but_never_numbers(width: int) -> None:
 
 
 def test_panel_is_not_drawn_into_a_file(tmp_path: Path) -> None:
-    """`2>file` swallowed the whole panel, and its keys went on working unseen."""
+    """With `2>file` the whole panel went into the file, and its keys still worked."""
     output = tmp_path / "said"
     near, far = os.openpty()
     with output.open("w") as file:

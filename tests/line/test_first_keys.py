@@ -1,4 +1,4 @@
-"""The first start on a terminal offers to try F12, and says what arrived."""
+"""The first start on a terminal offers to test F12, and shows the received keys."""
 
 from __future__ import annotations
 

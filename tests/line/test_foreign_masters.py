@@ -27,7 +27,7 @@ class Mbpoll:
     place: tuple[str, ...]
 
     def run(self, address: int, *values: str, count: int = 1) -> subprocess.CompletedProcess[str]:
-        """Read so many words, or write the values."""
+        """Read this many words, or write the values."""
         options = ["-a", "2", "-0", "-1", "-t", "4", "-r", str(address), "-c", str(count)]
         if values:
             options = options[:-2]

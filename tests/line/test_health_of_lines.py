@@ -1,4 +1,4 @@
-"""The last minute of a line in programs on it, each a process of its own, held by a keeper."""
+"""Last minute of a line held by a keeper, in programs as separate processes."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def frozen_keeper(programs: ExitStack, line: str) -> Iterator[tuple[int, Served,
 
 
 def gateway(programs: ExitStack) -> tuple[Simulation, str]:
-    """A drive behind a gateway that takes one connection: no stop gets past who holds it."""
+    """A drive behind a gateway with one connection: no stop can bypass its holder."""
     drive = DriveSpec("atv71", 1, sets={"TTO": 300})
     simulation = programs.enter_context(Simulation([drive]))
     return simulation, programs.enter_context(one_connection(simulation.serve_tcp(), "wait"))

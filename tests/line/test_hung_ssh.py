@@ -1,4 +1,4 @@
-"""Keys over a real SSH session whose link hangs and then lets everything through at once."""
+"""Keys over a real SSH session whose link hangs and then delivers everything together."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ class HangingLink:
 
     @contextmanager
     def hung(self) -> Iterator[None]:
-        """Nothing passes while inside; all of it behind."""
+        """Nothing passes inside the block; everything passes after it."""
         self._free.clear()
         try:
             yield

@@ -79,7 +79,7 @@ def hang():
 threading.Thread(target=hang, daemon=True).start()
 main()
 """
-"""A command the loop of whose line hangs once it reads a line."""
+"""A command whose loop hangs once it reads a line."""
 
 
 def test_motor_of_a_program_whose_loop_hangs_is_stopped() -> None:

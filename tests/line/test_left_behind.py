@@ -1,4 +1,4 @@
-"""A motor whose program was killed: the next one knows it, says so, and takes it over by a key."""
+"""A motor whose program was killed: the next program reports it, and takes it over by a key."""
 
 from __future__ import annotations
 

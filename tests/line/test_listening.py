@@ -1,4 +1,4 @@
-"""Listening beside a master that the project did not write, and what the system sees of it."""
+"""Monitoring a third-party master, and the system calls on its port."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ def _reads(log: Path, path: str) -> int:
 
 
 def _calls(log: Path, path: str) -> set[str]:
-    """The calls that name a descriptor of the port, an ioctl with what it asks."""
+    """Calls that name a descriptor of the port; an ioctl with its request."""
     found = set()
     for line in _lines(log):
         match = re.match(r"\d+\s+(\w+)\((.*)", line)

@@ -27,7 +27,7 @@ DEVICE = 3
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of drive and what it calls things."""
+    """A kind of drive and its names."""
 
     profile: str
     chart: str
@@ -45,7 +45,7 @@ KINDS = (
 
 @dataclass(frozen=True)
 class Bench:
-    """A drive of a kind on a line that names no settings of its own."""
+    """A drive of a kind on a line without settings."""
 
     kind: Kind
     line: str
@@ -150,7 +150,7 @@ def test_own_drive_is_configured_backed_up_and_restored(bench: Bench, tmp_path: 
 
 
 def test_own_drive_gets_only_requests_it_accepts(bench: Bench) -> None:
-    """All words at once: no read is longer than 8, none goes over a hole, none is refused."""
+    """All words together: no read is longer than 8, none crosses a hole, none is refused."""
     profile = library.load_file(HERE / "profiles" / f"{bench.kind.profile}.toml")
     codes = [p.code for p in profile.parameters]
     reported = json.loads(bench.done("read", *codes, "--json"))

@@ -1,4 +1,4 @@
-"""Errors of the panel itself while a motor turns: the stop goes out first, then one sentence."""
+"""Internal errors of the panel while a motor turns: the stop is sent first, then one sentence."""
 
 from __future__ import annotations
 
@@ -104,7 +104,7 @@ A_WHILE = 1.0
 def failing(
     folder: Path, *plants: tuple[str, str], dialog: str = "", options: tuple[str, ...] = ()
 ) -> Iterator[PtyPanel]:
-    """A panel whose motor runs; errors, each with its place, come once `now` is in the folder."""
+    """A panel with a running motor; errors occur at their places once `now` is in the folder."""
     wanted = [Plant(place, str(folder / "now"), error) for error, place in plants]
     if dialog:
         look = "tui.screens.status_refresher:StatusRefresher.look_around"
@@ -121,7 +121,7 @@ def failing(
 
 
 def end(panel: PtyPanel, folder: Path, keys: str = "") -> bytes:
-    """Let the errors come; the stop goes out and nothing else. What came on the terminal."""
+    """Trigger the errors; only the stop is sent. Return the output of the terminal."""
     writes, sent = len(panel.log.writes), len(panel.sent)
     (folder / "now").touch()
     for key in keys:
@@ -242,7 +242,7 @@ def test_second_error_during_the_wait_reports_an_unknown_result(
 
 
 def hold_the_ramp(panel: PtyPanel, folder: Path) -> int:
-    """Let the errors come; the motor ramps down until `end_the_ramp`. The output before it."""
+    """Trigger the errors; the motor ramps until `end_the_ramp`. Return the output before it."""
     panel.simulation.drive(1).set("DEC", SLOW)
     sent = len(panel.sent)
     (folder / "now").touch()

@@ -1,4 +1,4 @@
-"""Programs in PID namespaces of their own, as containers have them, on one line."""
+"""Programs in separate PID namespaces, like containers, on one line."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def programs() -> Iterator[ExitStack]:
 
 
 def inside(program: Served) -> int:
-    """The process id outside of what `unshare` has started."""
+    """Process id, outside, of the program that `unshare` has started."""
     pid = program.process.pid
     return int(Path(f"/proc/{pid}/task/{pid}/children").read_text().split()[0])
 

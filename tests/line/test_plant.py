@@ -43,7 +43,7 @@ def printed(kind: str, begins: str) -> str:
 
 @dataclass
 class RealBroker:
-    """mosquitto with the settings of the page, at a port of its own."""
+    """mosquitto with the settings of the page, at its own port."""
 
     program: str
     folder: Path

@@ -1,4 +1,4 @@
-"""`drivepanel serve` beside other programs: clients of other makers, runs, stops, ends."""
+"""`drivepanel serve` and other programs: third-party clients, runs, stops, ends."""
 
 from __future__ import annotations
 

@@ -125,7 +125,7 @@ def test_group_without_a_folder_gets_advice(tmp_path: Path, tcp_line: str) -> No
 def test_serve_opens_its_socket_for_the_group_that_is_configured(
     tmp_path: Path, tcp_line: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """One user is enough: the group is one of his own, the rest is what the system does."""
+    """One user is enough: the group is his own, the rest is done by the system."""
     groups = [*os.getgroups(), os.getgid()] if os.geteuid() else [grp.getgrnam(GROUP).gr_gid]
     number = next((group for group in groups if group != os.getgid()), os.getgid())
     folder = tmp_path / "group"

@@ -1,4 +1,4 @@
-"""Programs that share a line, as processes of their own: killed, frozen, hung up on."""
+"""Programs that share a line, as separate processes: killed, frozen, disconnected."""
 
 from __future__ import annotations
 
@@ -124,7 +124,7 @@ def test_stop_of_the_motor_of_a_frozen_program_lasts(
 
 
 def goes_on_stopped(simulation: Simulation, runner: Served) -> None:
-    """A frozen `run` goes on, hears that its motor was stopped, and sends it nothing but stops."""
+    """A frozen `run` resumes, learns that its motor was stopped, and sends only stops."""
     runner.process.send_signal(signal.SIGCONT)
     output, _ = runner.process.communicate(timeout=PATIENCE)
     # it learns of the stop when it resumes, or their number if it was disconnected
@@ -199,7 +199,7 @@ def test_motor_of_a_frozen_program_is_taken_over_by_a_key(
 
 @contextmanager
 def one_connection(target: tuple[str, int], others: str) -> Iterator[str]:
-    """A gateway that serves one connection at a time; `others` wait, or are hung up on."""
+    """A gateway that serves one connection at a time; `others` wait, or are disconnected."""
     free = threading.Semaphore()
 
     def carry(source: socket.socket, sink: socket.socket) -> None:

@@ -33,7 +33,7 @@ sys.argv = ["drivepanel", *sys.argv[1:]]
 from tui.__main__ import main
 main()
 """
-"""The program, none of whose imports works."""
+"""The program with no working import."""
 
 
 @pytest.fixture

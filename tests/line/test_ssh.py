@@ -88,7 +88,7 @@ def ssh_host(peer: Peer, tmp_path: Path) -> Iterator[SshHost]:
 
 
 def panel_over(host: SshHost, tmp_path: Path, *arguments: str) -> list[str]:
-    """The command that logs in and starts the panel there, which leaves its process id behind."""
+    """The command that logs in and starts the panel there, and leaves its process id."""
     environment = {
         name: os.environ[name]
         for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE", "LC_ALL", "TZ")
@@ -119,7 +119,7 @@ def test_demo_runs_over_ssh(
 
 
 SETTLED = 0.5
-"""Seconds that a question has stood before its answer counts, and a little more."""
+"""Seconds that a question must be open before its answer counts, and a little more."""
 
 
 def test_blocked_terminal_does_not_stop_polling(
@@ -203,7 +203,7 @@ class Counter:
 
 
 def choose(terminal: Terminal, name: str) -> None:
-    """Put the mark of Line on the drive whose reference begins with this name."""
+    """Move the cursor of Line to the drive whose reference begins with this name."""
     lines = terminal.text().splitlines()
     title = next(i for i, line in enumerate(lines) if "Dev " in line)
     column = lines[title].index("Dev ")
@@ -225,7 +225,7 @@ def stopped(*pids: int) -> Iterator[None]:
 
 
 def _fill_terminal_of(pid: int) -> None:
-    """Fill what a process's terminal holds for its reader, with bytes that no terminal shows."""
+    """Fill the output buffer of a process's terminal, with bytes that no terminal shows."""
     terminal = os.open(f"/proc/{pid}/fd/1", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
     try:
         with suppress(BlockingIOError):

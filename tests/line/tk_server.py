@@ -1,6 +1,6 @@
 """A Modbus server on modbus-tk, for tests: `tk_server.py tcp` or `tk_server.py rtu PATH`.
 
-A process of its own: its threads and warnings stay out of the tests.
+A separate process keeps its threads and warnings out of the tests.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class FakeClock(Clock):
         self._ahead: tuple[float, ...] = (0.0,)
 
     def advance(self, seconds: float) -> None:
-        """Advance by these seconds at once."""
+        """Advance by these seconds immediately."""
         ahead = self._ahead[-1] + seconds
         # the longer one first: another thread may look between the two
         self._ahead = (*self._ahead, ahead)

@@ -16,7 +16,7 @@ from tui.drive.profile.schema import ProfileData
 
 
 class BlockDrive(FakeDevice):
-    """A drive that fills missing words of a block with a word of its own."""
+    """A drive that returns its own word for missing words of a block."""
 
     unknown_word = 0x8000
 

@@ -65,7 +65,7 @@ class Bench:
         return await self.write(await self.stage(**typed))
 
     async def write(self, edits: Edits, **how: Any) -> Applied:
-        """Apply what was staged, armed."""
+        """Apply the staged edits, armed."""
         return await apply_edits(self.session, self.journal, edits, permit=self.permit(), **how)
 
     def after_writes(self, count: int, then: Callable[[], None]) -> None:

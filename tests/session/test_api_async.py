@@ -142,7 +142,7 @@ async def test_calls_of_loops_in_several_threads_share_a_drive(drive: AsyncDrive
 async def test_exchange_in_flight_continues_after_its_caller(
     slow: tuple[Simulation, OpenLine],
 ) -> None:
-    """A reply that comes late must be that of its own request, for each moment of the end."""
+    """A late reply must be that of its own request, for each moment of the cancellation."""
     _, opened = slow
     line = AsyncDriveLine(opened)
     drive = await line.drive(profile="atv71")

@@ -31,7 +31,7 @@ with open_drives("sim:atv71") as line:
 
 @pytest.fixture(scope="module")
 def user(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The folder of a user, with the wheel in an environment of its own and the page's scripts."""
+    """A user folder with the wheel in its own environment, and the scripts of the page."""
     folder = tmp_path_factory.mktemp("user")
     venv.create(folder / "venv")
     site = Path(get_path("purelib", vars={"base": str(folder / "venv")}))

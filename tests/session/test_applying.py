@@ -73,7 +73,7 @@ async def test_value_beyond_another_parameter_is_not_sent() -> None:
 
 
 async def test_edits_that_depend_on_a_refused_one_are_held_back() -> None:
-    """A limit that was to be raised first was not: what would pass it is not sent."""
+    """A limit that was to be raised first was not: values beyond it are not sent."""
     with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
         edits = await made.stage(TFR="80", HSP="75", LSP="10", ACC="4 s")
         made.refuse("TFR")
@@ -241,7 +241,7 @@ async def test_lost_line_ends_writing_and_keeps_the_rest() -> None:
 
 @pytest.mark.parametrize("taken", [True, False])
 async def test_writing_continues_if_another_owner_takes_the_line(taken: bool) -> None:
-    """The owner's end during a write ended a restore, though the line had a new owner at once."""
+    """The owner's end during a write ended a restore, although the line had a new owner."""
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
         ended = "The program that owned the line ended during the request."

@@ -27,7 +27,7 @@ class Bench:
 
     time: float = 100.0
     sign: float | None = None
-    """When the client that started the motor was last heard."""
+    """Time of the last message of the client that started the motor."""
     heard: float = 100.0
     latest: Any = None
     timeout: Timeout | None = field(

@@ -187,7 +187,7 @@ def test_unknown_chart_value_selects_no_chart() -> None:
 
 @pytest.mark.parametrize("family", FAMILIES)
 async def test_swapped_stop_word_runs_no_motor(family: str) -> None:
-    """A gateway that swaps what is written too: each stop word, at rest."""
+    """A gateway that swaps writes too: each stop word, at standstill."""
     with line_to(DriveSpec(family, 1), HEALTHY) as (simulation, line, session):
         words = {
             (session.profile[order.parameter or chart.command].address, word & 0xFFFF)

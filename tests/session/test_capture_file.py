@@ -13,7 +13,7 @@ READ = bytes.fromhex("0318750005")
 
 
 class FullDisk:
-    """A file that takes so many bytes more, and then a part of what is written, or nothing."""
+    """A file that accepts this many bytes, and then a part of a write, or nothing."""
 
     def __init__(self, file: Any, room: int) -> None:
         self._file = file

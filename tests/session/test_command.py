@@ -36,7 +36,7 @@ ALTIVARS = FAMILIES[:4]
 
 
 class Bench(NamedTuple):
-    """A drive, the line to it, and what commands it."""
+    """A drive, its line, and its commander."""
 
     drive: SimulatedDrive
     line: Line
@@ -80,7 +80,7 @@ class Bench(NamedTuple):
         return self.session.clock
 
     async def let_go_until(self, holds: Callable[[], bool]) -> None:
-        """Let the time of the session and of the drive go by until something holds."""
+        """Advance the time of the session and of the drive until something holds."""
         await let_go_until(self.clock, holds)
 
     async def until(self, holds: Callable[[], bool], seconds: float = 60.0) -> None:

@@ -81,7 +81,7 @@ def test_own_profile_is_compared_by_its_references() -> None:
 
 
 class Answering(OneDrive):
-    """A line whose drive answers function 43 so; `priorities` lists the priorities."""
+    """A line whose drive answers function 43 this way; `priorities` lists the priorities."""
 
     def __init__(self, answer: IdentificationObjects | Exception) -> None:
         super().__init__({})

@@ -1,4 +1,4 @@
-"""The counters of a drive beside ours: what each difference means, over real lines too."""
+"""Counters of a drive and own counts: the meaning of each difference, over real lines too."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ async def why(line: ModbusLine, device: int = 2, family: str | None = "atv71") -
 
 
 def reported(found: Diagnosis) -> Diagnosis:
-    """The same, after a look at its form: one sentence, and steps that are sentences."""
+    """The same, with a check of its form: one sentence, and steps that are sentences."""
     assert found.text.endswith(".")
     assert ". " not in found.text
     assert found.well is (not found.steps)
@@ -302,7 +302,7 @@ async def test_echo_without_a_reply_is_the_cause(line: OpenedLine) -> None:
 
 
 def at(baud: int, format_: str) -> Script:
-    """A drive whose every answer is heard at 19200 8E1, and is sent otherwise."""
+    """A drive whose every reply is received at 19200 8E1, and is sent otherwise."""
 
     def script(request: bytes, _count: int) -> list[bytes | float]:
         return [misheard(reply(request), (baud, format_), (19200, "8E1")).data]

@@ -1,4 +1,4 @@
-"""Words written through the outputs of simulated drives: only what was named, and seen held."""
+"""Words written through the outputs of simulated drives: only named ones, and verified."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ async def test_value_between_two_named_values_is_kept() -> None:
 async def test_start_is_recorded_before_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A look at the rest before the frame must not end the record."""
+    """A standstill read before the frame must not end the record."""
     with bench("atv71", sets={"CHCF": 1}) as here:
         _, outputs = await both(here)
         keeper = here.session.starts = StartKeeper("test")
@@ -280,7 +280,7 @@ async def test_write_cut_by_stop_is_not_recorded_as_done(monkeypatch: pytest.Mon
 async def unanswered(
     monkeypatch: pytest.MonkeyPatch, here: Bench, work: Coroutine[Any, Any, Any]
 ) -> asyncio.Task[Any]:
-    """Work whose write has begun and gets no answer."""
+    """A write that has begun and gets no reply."""
     begun = asyncio.Event()
 
     async def write(*_: Any, **__: Any) -> None:

@@ -130,7 +130,7 @@ async def test_identification_that_stays_damaged_infers_no_family(error: Exchang
 
 
 class LosesReads(FakeLine):
-    """A line that loses the reply to the second read, and carries the others."""
+    """A line that loses the second reply, and delivers the others."""
 
     async def read(self, device: int, address: int, *some: int, **how: Any) -> Reply:
         reply = await super().read(device, address, *some, **how)

@@ -1,4 +1,4 @@
-"""The first word of a stop, on the wire: before the drive has said what it is."""
+"""First word of a stop, on the wire: before the drive is identified."""
 
 from __future__ import annotations
 

@@ -72,7 +72,7 @@ async def test_start_ends_the_keep_alive(bench: Make) -> None:
 
 
 async def test_running_motor_is_not_kept_alive(bench: Make) -> None:
-    """Its controller is gone: the drive's own timeout stops it."""
+    """Its controller has disconnected: the drive's own timeout stops it."""
     made = bench(ALTIVAR_71, commands=True)
     assert await made.write(CMD, 0x0007) == 0
     await start_motor(made)

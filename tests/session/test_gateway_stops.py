@@ -131,7 +131,7 @@ async def test_polls_wait_for_the_next_read_of_a_client(
 
 
 async def test_stop_after_write_is_preceded_by_one_read(wire: Wire) -> None:
-    """It may have changed what the word does."""
+    """It may have changed the effect of the word."""
     await wire.known()
     assert (await wire.ask(struct.pack(">BHH", 6, ACC, 57)))[0] == 6
     before = len(wire.requests())
@@ -171,7 +171,7 @@ async def test_stops_of_one_host_do_not_delay_another_host(wire: Wire) -> None:
 
 
 async def test_stop_does_not_wait_for_the_read_of_another_stop() -> None:
-    """Each goes out as soon as its own read has come."""
+    """Each is sent as soon as its own read is answered."""
     turns = HostTurns()
     order: list[tuple[str, int]] = []
     held = asyncio.Event()

@@ -390,7 +390,7 @@ async def test_closed_guard_stops_no_motor(bench: Bench) -> None:
 async def test_unstable_line_is_abandoned_like_a_lost_one(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A number of a port that others get, a gateway that hangs up: connected for a moment."""
+    """The port number is reused, or a gateway hangs up: connected for a moment."""
     bench.started(1)
     guardian = bench.guardian()
     bench.simulation.stop()

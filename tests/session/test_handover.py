@@ -33,7 +33,7 @@ REMOTE = Program("remote", "panel", 77, "", "pts/9")
 
 
 class Heard(LinePublisher):
-    """The voice of this program, as another one would hear it."""
+    """Messages of this program, as another one receives them."""
 
     def __init__(self) -> None:
         super().__init__(self.hear)
@@ -107,7 +107,7 @@ def commanded_there(bench: Bench) -> None:
 
 
 async def expires(bench: Bench) -> None:
-    """Let the time for an answer go by."""
+    """Advance the time beyond the deadline of an answer."""
     await asyncio.sleep(0.05)
     bench.clock.advance(REQUEST_ANSWERED_WITHIN + 1)
     await asyncio.to_thread(eventually, lambda: len(bench.answers) > 0)

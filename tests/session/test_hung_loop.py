@@ -48,7 +48,7 @@ def stopped(line: FakeLine) -> Heard:
 
 
 async def direct_stop(voice: Heard) -> tuple[object, ...] | None:
-    """The first stop that goes around the loop, if one does within some seconds."""
+    """The first direct stop, if one is sent within some seconds."""
     for _ in range(500):
         if found := [pair for pair in voice.output if pair[0] == "directly"]:
             return found[0]

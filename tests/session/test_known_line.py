@@ -1,4 +1,4 @@
-"""A line is compared with what is remembered of it, and held where it is not the same."""
+"""A line is compared with its stored identity, and held if it differs."""
 
 from __future__ import annotations
 

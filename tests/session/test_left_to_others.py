@@ -18,7 +18,7 @@ RUNS_ON = "the motor runs."
 
 
 def on_a_line(*others: Program, requested: bool = True) -> DriveSession:
-    """A drive whose motor was started here."""
+    """A drive whose motor this program has started."""
     line = FakeLine({1: {}})
     line.facts.set_programs((line.facts.me, *others))
     line.pace.others = {1: 0.1} if requested else {2: 0.1}

@@ -1,4 +1,4 @@
-"""The troubles of a line by its last minute: thresholds, hysteresis, and what is reported."""
+"""Troubles of a line by its last minute: thresholds, hysteresis, and messages."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def counted(line: LastMinute, drives: Mapping[int, LastMinute] | None = None) ->
 
 
 def kinds_after(*minutes: LastMinute) -> list[Sequence[str]]:
-    """The kinds of trouble after each of these looks at a line with one drive."""
+    """Kinds of trouble after each of these checks of a line with one drive."""
     health, found = LineHealth(), list[Sequence[str]]()
     for minute in minutes:
         health.look(counted(minute, {1: minute}))

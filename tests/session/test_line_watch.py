@@ -77,7 +77,7 @@ async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
 
 
 class Kept:
-    """A drive with so many tenths of a second to its timeout, looked after."""
+    """A watched drive with this many tenths of a second to its timeout."""
 
     def __init__(self, tenths: int) -> None:
         self.line = HeardLine(tenths)
@@ -161,7 +161,7 @@ async def test_drive_of_unknown_family_is_kept_alive_until_it_is_known() -> None
 async def test_drive_is_kept_alive_while_its_timeout_is_learned(
     keep: Callable[[int], Kept],
 ) -> None:
-    """Polls wait for seconds behind the silence of a word that it does not have."""
+    """Polls wait for seconds after the silence at a word that it does not have."""
     kept = keep(70)
     kept.line.answers.clear()
     assert kept_alive(kept.line) == [KeepAlive(1, UNKNOWN_TIMEOUT, STATE)]

@@ -50,7 +50,7 @@ class Heard:
         return self
 
     def rest(self, seconds: float = 5.0) -> Heard:
-        """Nothing comes for so long."""
+        """Nothing arrives for this time."""
         self.now += seconds
         self.reported += self.listener.idle(self.now)
         return self
@@ -354,7 +354,7 @@ def test_silence_and_noise_are_reported() -> None:
 
 
 def test_scale_follows_values_seen_from_the_same_drive() -> None:
-    """A value whose scale follows another word is raw until that was heard."""
+    """A value whose scale follows another word is raw until that was received."""
     profile = next(p for p in PROFILES if any(item.scale_by for item in p.parameters))
     entry = next(p for p in profile.parameters if p.scale_by and "r" in p.access)
     assert entry.scale_by is not None

@@ -1,4 +1,4 @@
-"""Monitoring over failed requests: what stays known, what is read again, what is forgotten."""
+"""Monitoring over failed requests: values that stay known, are read again, or are dropped."""
 
 from __future__ import annotations
 

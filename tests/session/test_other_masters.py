@@ -69,7 +69,7 @@ def test_foreign_replies_and_unknown_bytes_show_a_master() -> None:
 
 @contextmanager
 def talking(peer: PtyPeer, *, gap: float) -> Iterator[None]:
-    """A master at work on the line of a peer, with so many seconds between its frames."""
+    """A master on the line of a peer, with this many seconds between its frames."""
     over = threading.Event()
 
     def talk() -> None:

@@ -1,4 +1,4 @@
-"""One owner per drive: what is known of it, what is done to it, who may, and who looks after it."""
+"""One owner per drive: for its values, its tasks, its permission and its timeout."""
 
 from __future__ import annotations
 
@@ -199,7 +199,7 @@ EIGHT = ("ACC", "DEC", "LSP", "AC2", "DE2", "TLS", "JPF", "ITH")
 
 
 async def test_stop_ends_parameter_writing_before_the_next_frame() -> None:
-    """Eight staged edits: what was on the wire may go out, nothing behind the stop does."""
+    """Eight staged edits: the frame on the wire may be sent, nothing after the stop is."""
     async with bench("atv71", run_hz=20.0) as here:
         editor, profile = here.console.editor, here.session.profile
         codes = [c for c in EIGHT if profile.get(c) and profile[c].access == "rw"]

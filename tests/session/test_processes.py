@@ -19,7 +19,7 @@ BEHIND = " ".join(["0"] * 18)
 
 
 def made_up(proc: Path, boot: str = "boot-1", **stats: str) -> Processes:
-    """A /proc with so many programs: `p7="S 100"` is number 7, sleeping, started at 100."""
+    """A /proc with these programs: `p7="S 100"` is number 7, sleeping, started at 100."""
     (proc / "sys/kernel/random").mkdir(parents=True, exist_ok=True)
     (proc / "sys/kernel/random/boot_id").write_text(f"{boot}\n")
     (proc / "self").mkdir(exist_ok=True)

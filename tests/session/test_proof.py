@@ -25,7 +25,7 @@ RAWS = {choice.parameter: choice.raw for choice in BLOCK.choices}
 
 @dataclass(frozen=True)
 class Signal:
-    """A value that stays, goes evenly, or trembles."""
+    """A value that stays, ramps evenly, or fluctuates."""
 
     base: int
     slope: float = 0.0
@@ -61,7 +61,7 @@ def compared(
     chance: random.Random,
     chosen: Mapping[str, str] | None = None,
 ) -> SlotEvidence:
-    """A proof after so many rounds; `behind` is what the slots really bring."""
+    """Evidence after this many rounds; `behind` is the real assignment of the slots."""
     proof = SlotEvidence(PROFILE, BLOCK)
     now = 0.0
 

@@ -41,7 +41,7 @@ class OwnTime(Clock):
         return self.now
 
     async def sleep(self, seconds: float) -> None:
-        """Let others have a turn, and the time go by."""
+        """Let other tasks run, and advance the time."""
         await asyncio.sleep(0)
         self.now += seconds
 
@@ -369,7 +369,7 @@ async def test_reaction_that_shows_a_moment_later_is_named() -> None:
 
 
 class TurningDrive(WatchingDrive):
-    """A drive at 50 Hz; after its timeout it goes on in another state, at another frequency."""
+    """A drive at 50 Hz; after its timeout it runs on in another state, at another frequency."""
 
     def __init__(self, clock: OwnTime, status: int, hertz: float) -> None:
         super().__init__(clock, 1.0)

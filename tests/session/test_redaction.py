@@ -7,7 +7,7 @@ import pytest
 from tui.session.bundle.redaction import HOME, HOST, SECRET, USER, Names, Redaction, local_names
 
 PEOPLE = "/".join(("", "home"))
-"""Written so that no test of the project takes it for a place on this machine."""
+"""Split so that no test of the project takes it for a path on this machine."""
 NAMES = Names(
     users=frozenset({"jdoe", "Jane Doe", "root", "x"}),
     hosts=frozenset({"Press7-PC", "localhost"}),

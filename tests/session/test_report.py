@@ -1,4 +1,4 @@
-"""The report on a drive: every family, what changed, what the journal knows."""
+"""The report on a drive: every family, changed settings, journal entries."""
 
 from __future__ import annotations
 

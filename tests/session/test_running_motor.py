@@ -87,7 +87,7 @@ def leaving_raises(
 
 
 def stop_by_another_program(bench: MotorBench) -> None:
-    """Another program stops the motor: this one hears of it, and the drive gets its word."""
+    """Another program stops the motor: this one is notified, and the drive gets its word."""
     stopped = DevicesStopped((1,), "drivepanel stop", Program("id", "stop", 4711))
     bench.line._calls.line.facts.events.emit(stopped)
     bench.simulation.drive(1).halt()

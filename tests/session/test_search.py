@@ -1,4 +1,4 @@
-"""The search for drives: every address once, the silent ones once more, behind everything else."""
+"""The scan: every address once, silent ones again, after everything else."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ async def until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
 
 
 def scattered(count: int) -> dict[str, int]:
-    """Writable words of the Altivar 71, far apart, each with a value of its own."""
+    """Writable words of the Altivar 71, far apart, each with its own value."""
     profile = library.load("atv71")
     found: dict[str, int] = {}
     last = -100
@@ -129,7 +129,7 @@ async def test_scanner_is_used_once_it_saves_time(start: Start) -> None:
 
 @dataclass(slots=True)
 class Shared:
-    """A drive that another program reads as well: what that got is taken for a minute."""
+    """A drive that another program reads as well: its values are reused for a minute."""
 
     simulation: Simulation
     line: ModbusLine
@@ -138,7 +138,7 @@ class Shared:
     words: dict[str, int]
 
     def change_slots(self) -> None:
-        """Turn the order of what the scanner brings round."""
+        """Reverse the order of the scanner's values."""
         for slot, address in assignment(self.codes[::-1]).items():
             self.simulation.drive(1).set(slot, address)
 

@@ -18,14 +18,14 @@ from .slow_drive import ENABLED, READY, STATUS, SWITCHED_ON, SlowBench, until
 
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Looks at the state as fast as they come."""
+    """Read the state as fast as possible."""
     monkeypatch.setattr(access, "STATE_POLL_INTERVAL", 0.0)
     monkeypatch.setattr(motor_start, "STATE_POLL_INTERVAL", 0.0)
 
 
 @pytest.fixture
 async def here(tmp_path: Path) -> AsyncIterator[SlowBench]:
-    """A drive that takes three looks for each step."""
+    """A drive that takes three reads for each step."""
     made = SlowBench(tmp_path)
     yield made
     made.end()
@@ -89,7 +89,7 @@ async def test_refused_start_keeps_the_record_of_the_running_motor(here: SlowBen
 
 
 async def test_record_ends_at_standstill_not_at_the_stop(here: SlowBench) -> None:
-    """A stop that the drive never heard leaves the start to be found by the next program."""
+    """A stop that never reached the drive leaves the start to be found by the next program."""
     await here.start()
     here.line.dead_to_writes = True
     stopper = Stopper(here.line, here.journal)

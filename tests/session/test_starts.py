@@ -110,7 +110,7 @@ def starts(tmp_path: Path) -> Iterator[Starts]:
 
 @pytest.fixture
 def hung(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
-    """A disk that hangs in flushing once the event is clear; it goes on at the end of the test."""
+    """A disk that hangs in flushing once the event is clear; it resumes at the end of the test."""
     works, real = threading.Event(), os.fsync
     works.set()
 
@@ -557,7 +557,7 @@ Drive = tuple[str, int]
 
 
 class Model:
-    """Starts without disk and threads: who started which drive, in order."""
+    """Starts without disk and threads: which program started which drive, in order."""
 
     def __init__(self) -> None:
         self.begun: dict[tuple[Drive, int], int] = {}

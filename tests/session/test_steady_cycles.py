@@ -120,7 +120,7 @@ class Steady:
         await self.until(lambda: self.holder.polls)
 
     async def cycle(self) -> Snapshot:
-        """Give a cycle, and take what the monitor makes of it."""
+        """Send a cycle, and return the snapshot of the monitor."""
         count = len(self.snapshots)
         self.line.requests.clear()
         self.holder.give()

@@ -69,7 +69,7 @@ async def ended(stopper: Stopper, device: int, clock: FakeClock | None = None) -
 
 
 def writes(line: Line) -> list[tuple[int, int]]:
-    """Register and word of every write that went out."""
+    """Register and word of every write that was sent."""
     sent = [frame.data for frame in line.trace if frame.direction == "out"]
     return [
         (int.from_bytes(data[2:4], "big"), int.from_bytes(data[4:6], "big"))

@@ -47,7 +47,7 @@ ROOMS = (
 BOTTOM = {"TcpTransport.send"}
 """Points without which nothing can be sent: the frame passes them on every path."""
 SOME = 12
-"""Every so many functions outside the sweeps, which take all."""
+"""Every nth function outside the sweeps, which take all."""
 PARTS = 3
 """Tests that the functions of a room are divided among in the sweeps: each has a time limit."""
 AT_ONCE = 1.0
@@ -56,7 +56,7 @@ FAMILY, COMMAND = "atv71", 8501
 
 
 class Wire:
-    """Simulated drives, and the stop words that were heard on their line."""
+    """Simulated drives, and the stop words on their line."""
 
     def __init__(self) -> None:
         self.stops: list[float] = []
@@ -220,7 +220,7 @@ def test_error_anywhere_in_a_stop_does_not_prevent_its_frame(
 
 
 def stopped(made: Bench, place: Place) -> list[str]:
-    """Press the stop key; what went wrong then."""
+    """Press the stop key; return the resulting error."""
     wire, pressed = made.wire, made.press()
     sent = until(lambda: bool(wire.stops) or made.not_stopped(), FRAME_WITHIN)
     # the owner may not have reached it yet, or a follow-up failed before the frame was sent

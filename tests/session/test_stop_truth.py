@@ -1,4 +1,4 @@
-"""A stop that a drive lacks, what takes its place, and what is said of it afterwards."""
+"""A stop that a drive lacks, its replacement, and the message afterwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several drives stopped at once: a word to all of them first, then what has to be read."""
+"""Several drives stopped together: a word to all of them first, then the necessary reads."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ SEEN = {"atv71": {"CHCF": 1, "DOTD": 1, "ETA": ENABLED}}
 
 
 def seen(family: str, raws: Mapping[str, int], ago: float = 0.0) -> DriveSession:
-    """A drive of which this was read so many seconds ago."""
+    """A drive whose words were read this many seconds ago."""
     clock = FakeClock()
     session = DriveSession(FakeLine(), 1, library.load(family), clock=clock)
     for code, raw in raws.items():

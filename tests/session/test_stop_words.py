@@ -1,4 +1,4 @@
-"""By which word a motor is stopped, and what counts as stopped."""
+"""The word that stops a motor, and the condition for "stopped"."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ async def test_stop_disarms_and_cancels_earlier_input(start: Start, journal: Jou
 async def test_coasting_motor_is_not_stopped_before_standstill(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its state says so at once: nothing drives it any more, and it turns for a while."""
+    """Its state shows it immediately: nothing drives the motor, and it turns for a while."""
     monkeypatch.setattr(motor_stop, "STANDSTILL_POLL_INTERVAL", 0.01)
     here = SlowBench(tmp_path, looks=0)
     await here.start()

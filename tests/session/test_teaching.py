@@ -36,13 +36,13 @@ OTHER = DriveIdentity(1, "Maker", "B-2", "1.0", "", None, ())
 
 @pytest.fixture(autouse=True)
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A state folder of its own."""
+    """A separate state folder."""
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path))
     return tmp_path
 
 
 def drive(identity: DriveIdentity | None = None, **words: int) -> tuple[OneDrive, Teacher]:
-    """A drive with its words by code, and its teacher, which has recalled what was kept."""
+    """A drive with its words by code, and its teacher, which has loaded the stored scales."""
     held = {parameter.address: 0 for parameter in PROFILE.parameters}
     held |= {PROFILE[code].address: word for code, word in words.items()}
     line = OneDrive(held)
@@ -52,7 +52,7 @@ def drive(identity: DriveIdentity | None = None, **words: int) -> tuple[OneDrive
 
 
 def kept(folder: Path, ending: str = "json") -> Path:
-    """The one file of what was taught, or of what was set aside."""
+    """The only file of learned scales, or of files set aside."""
     (path,) = folder.glob(f"taught/*.{ending}")
     return path
 
@@ -172,7 +172,7 @@ async def test_scales_learned_by_two_programs_are_kept() -> None:
 
 
 async def preset(unit: str = "Hz") -> Teacher:
-    """A drive whose preset was taught, 0.1 a count."""
+    """A drive whose preset has a learned scale, 0.1 per count."""
     line, teacher = drive(PRESET=300)
     await teacher.look("PRESET", "30.0", unit)
     line.registers[120] = 400
@@ -230,7 +230,7 @@ async def test_discarded_scale_ends_the_reference_and_its_confirmation() -> None
 
 
 async def presets(limit_unit: str) -> tuple[OneDrive, Teacher]:
-    """A drive whose preset takes the reference in rpm, and whose highest reference is 1500."""
+    """A drive whose preset accepts the reference in rpm, and whose maximum reference is 1500."""
     line, teacher = drive(PRESET=300, MOST=1500)
     await teacher.look("PRESET", "300", "rpm")
     line.registers[120] = 400
@@ -243,7 +243,7 @@ async def presets(limit_unit: str) -> tuple[OneDrive, Teacher]:
 
 
 async def parsed(teacher: Teacher, text: str) -> Reference:
-    """A reference as typed, checked against what the drive holds."""
+    """A typed reference, checked against the values of the drive."""
     profile = teacher.session.profile
     readings = await Reader(teacher.session).read(reference_codes(profile))
     return parse_reference(profile, text, readings)

@@ -145,7 +145,7 @@ def left(holder: LineHolder, name: str, *events: Event) -> None:
 
 
 def found(holder: LineHolder, log: EventLog, name: str = "next") -> list[Event]:
-    """The events of a program that asks for those of others."""
+    """Events of a program that requests those of others."""
     EventNotes(holder.program(name), log).ask()
     return list(log.events)
 

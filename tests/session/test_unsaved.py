@@ -1,4 +1,4 @@
-"""Settings that a drive keeps until power-off only: those that differ from what it has saved."""
+"""Settings lost at power-off: those that differ from their saved values."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Loop(FakeLine):
 
 
 class _Late:
-    """A worker that hears of being cancelled a few turns of the loop later."""
+    """A worker that notices its cancellation a few turns of the loop later."""
 
     def __init__(self, task: LineWorker) -> None:
         self._task = task

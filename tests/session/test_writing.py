@@ -1,4 +1,4 @@
-"""Writing one parameter to a drive that does as it likes: what it holds then is what is known."""
+"""Writing one parameter to an unpredictable drive: its value read back is what is known."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class WilfulLine(OneDrive):
 
     @property
     def written(self) -> list[tuple[int, int]]:
-        """Address and word of all writes that went out."""
+        """Address and word of all writes that were sent."""
         return [
             (request.address, request.value)
             for request in self.requests

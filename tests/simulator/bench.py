@@ -45,6 +45,6 @@ class Bench:
         return int(reply[4:], 16)
 
     def run(self, seconds: float, step: float = 0.02) -> None:
-        """Let time pass."""
+        """Advance the time."""
         for _ in range(round(seconds / step)):
             self.drive.step(step)

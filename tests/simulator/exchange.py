@@ -58,7 +58,7 @@ class Exchange:
             self.wait(float(text))
 
     def wait(self, seconds: float) -> None:
-        """Let time pass."""
+        """Advance the time."""
         for _ in range(round(seconds / STEP)):
             self.drive.step(STEP)
 

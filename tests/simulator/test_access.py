@@ -1,4 +1,4 @@
-"""Reading and writing words: what each family refuses, keeps, limits and forgets."""
+"""Reading and writing words: what each family refuses, clamps, limits and loses."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_read_only_word_refuses_like_its_family(profile: str, code: str, answer:
 
 
 def test_leroy_somer_is_silent_instead_of_an_exception() -> None:
-    """Its manual documents no exception; silence is what it says for other refusals."""
+    """Its manual documents no exception; it answers other refusals with silence."""
     bench = Bench("powerdrive")
     assert bench.write("10.40", 1) is None
     assert bench.ask(read(9999, 1)) is None

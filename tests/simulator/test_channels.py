@@ -102,7 +102,7 @@ def test_on_the_atv71_ccc_crc_and_lrs7_follow_li5() -> None:
 
 @pytest.mark.parametrize("family", ALL)
 def test_with_fr1_at_ai1_and_fr2_at_modbus_rfc_gives_modbus_the_command(family: str) -> None:
-    """The case in which a look at Fr1 alone is wrong."""
+    """The case in which reading Fr1 alone is misleading."""
     Exchange(family, {"CHCF": 1, "FR1": 1, "FR2": 164, "RFC": 97}).play(f"""
         > 02 03 {LRS3} 0001
         < 02 03 02 0003

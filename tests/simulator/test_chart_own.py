@@ -1,4 +1,4 @@
-"""Drives of other makes play the chart of their own profile: raw exchanges."""
+"""Drives of other makes follow the chart of their own profile: raw exchanges."""
 
 from __future__ import annotations
 

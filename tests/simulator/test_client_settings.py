@@ -1,4 +1,4 @@
-"""The settings of the line matter: who is set otherwise than the drive is not understood."""
+"""Line settings: a client with other settings than the drive gets no reply."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ LONG_ENOUGH = 0.5
 
 @contextmanager
 def terminal(path: str, baud: int | None = None, stop_bits: int = 1) -> Iterator[int]:
-    """The client's end; without a baud it sets nothing but what makes it raw."""
+    """The client's end; without a baud it sets only raw mode."""
     port = os.open(path, os.O_RDWR | os.O_NOCTTY)
     try:
         tty.setraw(port)
@@ -121,7 +121,7 @@ def test_drive_answers_at_its_new_baud_after_power_up() -> None:
 
 
 class OwnTransport:
-    """A transport on which parity can be seen, as on a wire: bytes with what they were sent at."""
+    """A transport that transfers parity, like a wire: bytes with their settings."""
 
     def __init__(self, drive_format: str, client: ClientSettings) -> None:
         timing = LineTiming(19200, drive_format)

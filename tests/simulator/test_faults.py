@@ -1,4 +1,4 @@
-"""Line faults on demand: each does what its name says, and a seed repeats them."""
+"""Line faults on demand: each has the effect of its name, and a seed repeats them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Several drives on one line: who answers, who obeys, who is deaf."""
+"""Several drives on one line: replies, broadcasts, and drives with other settings."""
 
 from __future__ import annotations
 

@@ -67,7 +67,7 @@ def test_drive_answers_as_printed_over_a_pseudo_terminal(example: Example) -> No
 
 
 def read(port: int, size: int, patience: float = 5.0) -> bytes:
-    """As many bytes from a terminal, or what came until patience ran out."""
+    """Read this many bytes from a terminal, or fewer at the timeout."""
     data = b""
     end = time.monotonic() + patience
     while len(data) < size and (left := end - time.monotonic()) > 0:

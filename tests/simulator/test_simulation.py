@@ -148,7 +148,7 @@ def test_client_that_sends_garbage_is_dropped_and_others_are_served() -> None:
 
 
 class Port:
-    """An opened port: what is put in is read, what is written comes out."""
+    """An open port: put bytes are read, written bytes are returned."""
 
     def __init__(self) -> None:
         self.inward: queue.Queue[bytes] = queue.Queue()

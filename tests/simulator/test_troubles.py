@@ -1,4 +1,4 @@
-"""The troubles of a simulated line, on the wire: what a plain pymodbus client meets."""
+"""Troubles of a simulated line, on the wire, with a plain pymodbus client."""
 
 from __future__ import annotations
 

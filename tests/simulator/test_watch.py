@@ -1,4 +1,4 @@
-"""The drive's watch over the line: when it starts, what refreshes it, what happens then."""
+"""Communication timeout of a drive: its start, its refresh, its reactions."""
 
 from __future__ import annotations
 

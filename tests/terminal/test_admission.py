@@ -43,7 +43,7 @@ class Question(ModalScreen[None]):
 
 
 class Panel(App[None]):
-    """Takes keys as the panel does, and notes what they did."""
+    """Accepts keys as the panel does, and records their effects."""
 
     AUTO_FOCUS = None
     BINDINGS: ClassVar = [
@@ -102,7 +102,7 @@ class Panel(App[None]):
         await asyncio.sleep(0.1)
 
     def send(self, *keys: str, stroke: Stroke | None = None) -> None:
-        """Keys as the driver brings them."""
+        """Keys as the driver delivers them."""
         for key in keys:
             event = events.Key(key, key if len(key) == 1 else None)
             attach(event, stroke or Stroke(time.monotonic(), self.stops))

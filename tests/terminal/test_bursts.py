@@ -35,7 +35,7 @@ class Bench:
         self.found: list[Pressed] = []
 
     def read(self, *names: str, after: float = 1.0) -> list[Pressed]:
-        """Keys of one read, so long after the last; what is given out by then."""
+        """Keys of one read, this long after the last; return the keys delivered by then."""
         self.now += after
         before = len(self.found)
         while (deadline := self.bursts.deadline()) is not None and deadline < self.now - 0.001:

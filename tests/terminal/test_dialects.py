@@ -1,4 +1,4 @@
-"""Keys out of what terminals send, whole and cut anywhere."""
+"""Keys from the bytes of terminals, whole and cut anywhere."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The driver: what it writes, when it takes bytes to have come, and where it reads no keys."""
+"""The driver: its output, the times of received bytes, and systems where it reads no keys."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Stops:
         self.failed = error
 
     def sequence_swallowed(self, data: bytes) -> None:
-        """No test of these looks at it."""
+        """Unused in these tests."""
 
     def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
         return False
@@ -47,7 +47,7 @@ class Stops:
 
 
 class OtherDriver(Driver):
-    """A driver of another system, whose keys Textual reads itself."""
+    """A driver of another system, where Textual reads the keys."""
 
     def __init__(self, app: Any, **settings: Any) -> None:
         super().__init__(app, **settings)

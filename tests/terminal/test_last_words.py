@@ -1,4 +1,4 @@
-"""The end of an app by an error of its own: every line is printed, also after a second error."""
+"""End of an app by an internal error: every line is printed, also after a second error."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ BEGUN, RESULT, SENTENCE = "It is being done.", "It is done.", "It had to end."
 
 
 class SlowDriver(Driver):
-    """A driver whose terminal has taken nothing before the driver is closed, as over a slow link.
+    """A driver whose terminal accepts no output until the driver is closed, as over a slow link.
 
-    Nothing is taken after that.
+    Nothing is accepted after that.
     """
 
     taken: list[str]
@@ -51,7 +51,7 @@ class SlowDriver(Driver):
 
 
 class Work:
-    """Work that ends when it is let, or by an error."""
+    """Work that ends on release, or by an error."""
 
     begun = BEGUN
 
@@ -68,7 +68,7 @@ class Work:
 
 
 class Ending(LastWords):
-    """An app that fails at once."""
+    """An app that fails immediately."""
 
     def __init__(self, error: BaseException | None = None) -> None:
         super().__init__()
@@ -101,7 +101,7 @@ class Ending(LastWords):
 
 @pytest.fixture(autouse=True)
 def own_process(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The process of the tests goes on after the app."""
+    """The process of the tests continues after the app."""
     monkeypatch.setattr("tui.terminal.last_words.ENDED_WITHIN", 3600.0)
     monkeypatch.setattr(threading, "excepthook", threading.excepthook)
     monkeypatch.setattr(sys, "unraisablehook", sys.unraisablehook)

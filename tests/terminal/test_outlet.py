@@ -1,4 +1,4 @@
-"""A terminal that goes away while the panel writes to it."""
+"""A terminal that disappears while the panel writes to it."""
 
 from __future__ import annotations
 

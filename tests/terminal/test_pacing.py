@@ -1,4 +1,4 @@
-"""No frame goes to a terminal that has not drawn the one before; links are simulated here."""
+"""No frame is sent to a terminal that has not drawn the previous one; links are simulated here."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tui.terminal.pacing import AHEAD, LOST_AFTER, MUTE_AFTER, WHOLE, Pacing
 
 @dataclass
 class Link:
-    """A link of a rate in bytes/s and a way of so many s; who sends by `Pacing` fills it."""
+    """A link with a rate in bytes/s and a delay in s; the sender fills it by `Pacing`."""
 
     rate: float
     way: float
@@ -97,7 +97,7 @@ def test_unrequested_acknowledgment_adds_no_room() -> None:
 
 @pytest.mark.parametrize("rate", [1000.0, 2000.0, 5000.0])
 def test_slow_link_has_at_most_one_second_in_flight(rate: float) -> None:
-    """Once the link has shown its rate: a key that comes back finds little before its own."""
+    """Once the link has shown its rate: the reply to a key finds little before its own."""
     link = Link(rate, 0.15, Pacing(slow=True))
     drawn(link, [4000])
     now = link.free + 1.0

@@ -25,11 +25,11 @@ FOLDER = Path(tui.terminal.__file__).parent
 PROJECT = FOLDER.parents[1] / "pyproject.toml"
 
 VERSIONS = {"textual": "<8.3,>=8.2", "pymodbus": "<3.17,>=3.16"}
-"""The minors that were looked at; a private part may be another one in the next."""
+"""The reviewed minor versions; a private part may change in the next."""
 
 
 class Part(NamedTuple):
-    """A private part of Textual, and whether it is still what is made of it here."""
+    """A private part of Textual, and the check that it is unchanged."""
 
     name: str
     used_in: str

@@ -39,7 +39,7 @@ class Stops:
         self.failed = error
 
     def sequence_swallowed(self, data: bytes) -> None:
-        """No test of these looks at it."""
+        """Unused in these tests."""
 
     def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
         return key in self.harmless and begins and after <= self.done_to
@@ -65,7 +65,7 @@ def read(
 
 
 def acting(keys: Sequence[Pressed], stamp: object) -> list[str]:
-    """The keys that may act where no stop came since."""
+    """Keys that may act if no stop came since."""
     return [key.name for key in keys if key.stroke.acts and key.stroke.stamp == stamp]
 
 
@@ -99,7 +99,7 @@ def test_keys_after_an_immediate_key_are_a_burst() -> None:
 
 @pytest.mark.parametrize("data", [b"2\t", b"2m", b"2\x1b", b"2\x1b["])
 def test_key_with_more_in_its_read_waits(data: bytes) -> None:
-    """Those keys have one time: a Space behind Tab would be text once the 2 had its effect."""
+    """Those keys have one time: a Space after Tab would be text once the 2 had its effect."""
     reader = KeyReader(Stops(harmless="2m", done_to=LATER))
     assert reader.read(data, 1.0, 0) == []
 

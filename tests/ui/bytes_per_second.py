@@ -1,9 +1,9 @@
-"""Bytes a second that the Monitor screen sends to its terminal, beside a plain panel.
+"""Bytes per second that the Monitor screen sends to its terminal, compared with a plain panel.
 
     python -m tests.ui.bytes_per_second [SECONDS]
 
-Both watch the same simulated, running Altivar 71 in a pseudo-terminal of 80 x 24, at their
-default rates. The bytes after their first full picture count.
+Both watch the same simulated, running Altivar 71 in a pseudo-terminal of 80 x 24, at their default
+rates. The bytes after their first full picture count.
 """
 
 from __future__ import annotations

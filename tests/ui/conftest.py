@@ -18,7 +18,7 @@ from .quick import drawn_for_a_person, parse_once, wait_for_the_busy
 
 @pytest.fixture(autouse=True)
 def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let questions and the run line accept Enter at once.
+    """Let questions and the run line accept Enter immediately.
 
     `test_questions` and `test_run_line` test the delay.
     """
@@ -33,7 +33,7 @@ def patience(patient_lines: None) -> None:
 
 @pytest.fixture(autouse=True)
 def nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let no search listen for another master first; `test_other_settings` tests that."""
+    """Let no scan monitor for another master first; `test_other_settings` tests that."""
     monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.0)
 
 

@@ -60,7 +60,7 @@ def hold(session: DriveSession, raws: Mapping[str, int]) -> None:
 def view_of(
     session: DriveSession, block: Block, raws: tuple[int, ...], held: Mapping[str, int]
 ) -> BlockView:
-    """Slots that all bring what they stand for."""
+    """Slots that all return the values of their parameters."""
     profile = session.profile
     hold(session, dict(zip(block.slots, raws, strict=True)))
     slots = []

@@ -106,7 +106,7 @@ def _part(number: str) -> str:
 
 
 class Seen(App[None]):
-    """Two columns of lines; every update goes to a terminal that is looked at."""
+    """Two columns of lines; every update goes to a checked terminal."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -162,7 +162,7 @@ def _seen(character: str, color: str) -> str:
 
 
 class Dialog(ModalScreen[None]):
-    """Covers a part of what is below, and dims the rest."""
+    """Covers a part of the content below, and dims the rest."""
 
     CSS = "Dialog { align: center middle; background: $background 60%; } Label { width: 12; }"
 

@@ -76,7 +76,7 @@ class Bench(NamedTuple):
         await self.message("Reference")
 
     async def run(self, key: str) -> None:
-        """Open the line of `r` or `v`: until Enter the motor does what it did."""
+        """Open the run line by `r` or `v`: until Enter the motor state is unchanged."""
         before, speed = time.monotonic(), self.speed()
         await self.pilot.press(key)
         await self.message("RUN FORWARD" if key == "r" else "RUN REVERSE", "Enter run")
@@ -114,7 +114,7 @@ class Bench(NamedTuple):
         return self.app.fleet.stopper.reports.get(device) if self.app.fleet else None
 
     async def stopped(self, device: int = 1, *, behind: StopReport | None = None) -> None:
-        """Wait for the end of a stop that was made behind that one; a second one needs it."""
+        """Wait for the end of a later stop; a second stop needs it."""
 
         def ended() -> bool:
             last = self.last_stop(device)

@@ -166,7 +166,7 @@ OVER = {
 
 THAT_ACT = ("run", "run-refused", "reference", "reset", "coast", "hand-back", "control-source-sure",
             "faults", "leave-running")  # fmt: skip
-"""Those behind which a motor or a drive is acted on."""
+"""Questions that act on a motor or a drive."""
 
 
 @SIZES

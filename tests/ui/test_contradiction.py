@@ -1,4 +1,4 @@
-"""A profile that was typed on Line, against what a drive says of itself."""
+"""A profile typed on Line, against the identification of a drive."""
 
 from __future__ import annotations
 

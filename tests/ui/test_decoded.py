@@ -1,4 +1,4 @@
-"""Frames in words: what every example of the manuals says, and that no bytes are too odd."""
+"""Frames in words: every example of the manuals, and random bytes."""
 
 from __future__ import annotations
 

@@ -61,13 +61,13 @@ APPLIED = Applied((), Edits(()))
 
 
 async def _no_bundle(_: PartProgress) -> Bundle:
-    """It is collected as long as the test goes on."""
+    """It is collected while the test runs."""
     await asyncio.sleep(3600)
     raise AssertionError
 
 
 async def _no_answer() -> Diagnosis:
-    """It is looked for as long as the test goes on."""
+    """It is found while the test runs."""
     await asyncio.sleep(3600)
     raise AssertionError
 
@@ -305,7 +305,7 @@ def faults_of(parse: Callable[[str], object]) -> Callable[[str], str]:
 
 
 LONG_NUMBER = "9" * 5000
-"""More digits than Python's int() takes, as a paste may bring them."""
+"""More digits than Python's int() accepts, as in a paste."""
 CHECKS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
     "rating": (fault_of_rating, ("NaN", "sNaN", "-Infinity", LONG_NUMBER)),
     "frames": (choice_of, (LONG_NUMBER, f"f{LONG_NUMBER}", "f", "2 f16")),

@@ -23,7 +23,7 @@ from .test_flows import alone
 
 
 class Opener:
-    """Opens fake lines; the one called `slow` only when it is let."""
+    """Opens fake lines; the one called `slow` only on release."""
 
     def __init__(self) -> None:
         self.let = threading.Event()

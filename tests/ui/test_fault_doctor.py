@@ -1,4 +1,4 @@
-"""The Faults screen as a doctor: causes, live values, checks, what a reset needs, alarms."""
+"""The Faults screen: causes, live values, checks, conditions of a reset, alarms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The first picture is whole, and stays what it was when the fields to type into are there."""
+"""The first picture is complete, and unchanged once the fields exist."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def picture(app: Any) -> list[list[tuple[str, str]]]:
 
 
 class FirstPicture(DrivePanelApp):
-    """Keeps the first picture that goes to the terminal."""
+    """Records the first picture that is sent to the terminal."""
 
     first: list[list[tuple[str, str]]] | None = None
     fields_then = 0

@@ -141,7 +141,7 @@ async def test_lost_line_is_shown_until_it_recovers() -> None:
 
 
 async def test_drive_with_a_timeout_is_still_polled() -> None:
-    """The Altivar 21 trips after 3 s without a request: found once, it is looked after."""
+    """The Altivar 21 trips after 3 s without a request: once found, it is kept alive."""
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)

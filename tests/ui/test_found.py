@@ -161,7 +161,7 @@ async def test_new_state_moves_nothing_in_a_long_drive_list(
 
 
 def taken() -> tuple[Fleet, DriveConsole]:
-    """An Altivar 71 that is looked after on a line."""
+    """A monitored Altivar 71 on a line."""
     fleet = Fleet(fakes.StillLine(), Journal())
     session = DriveSession(fleet.line, 2, library.load("atv71"), fakes.ATV71)
     return fleet, fleet.take(session)

@@ -1,4 +1,4 @@
-"""Pictures of Frames: words, what is left of a filter, and the counters."""
+"""Pictures of Frames: words, the result of a filter, and the counters."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def talk(peer: PtyPeer) -> None:
 
 
 async def heard(app: DrivePanelApp, pilot: Pilot[None], peer: PtyPeer) -> None:
-    """H was pressed: the screen is there, and shows what is said."""
+    """H was pressed: the screen is open, and shows the traffic."""
     await until(pilot, lambda: isinstance(app.screen, HeardScreen))
     talk(peer)
     await until(pilot, lambda: "6 write LFR ← 30.0 Hz" in shown(app, "frames"))

@@ -62,9 +62,9 @@ GENERIC = {
 }
 """Keys that do alike on alike things: why each may have an action on each screen."""
 AT_ONCE = {"k": "quick-stop", "e": "emergency-stop"}
-"""Letters that write at once: stops, which need no arming and wait for nothing."""
+"""Letters that write immediately: stops, which need no arming and wait for nothing."""
 LETTERS = [*"wW", *(key for key in string.ascii_letters if key not in "kewWuU"), *"uU"]
-"""Every other letter; those that write come first, those that drop what waits come last."""
+"""Every other letter; letters that write come first, letters that drop pending work last."""
 
 
 @pytest.fixture(autouse=True)
@@ -202,7 +202,7 @@ async def test_key_without_a_meaning_says_where_it_works_and_does_nothing() -> N
 
 
 def attributes_of_classes(path: Path) -> Iterator[str]:
-    """Names that the classes of a module give to what they have."""
+    """Names that the classes of a module define."""
     for node in nodes_of(path):
         match node:
             case ast.Attribute(value=ast.Name(id="self"), attr=name, ctx=ast.Store()):
@@ -213,7 +213,7 @@ def attributes_of_classes(path: Path) -> Iterator[str]:
 
 
 def test_no_method_has_the_name_of_a_key() -> None:
-    """Textual calls what is named key_ and the name of a key: @ is called at."""
+    """Textual calls methods named key_ and the name of a key: @ is called at."""
     named = {
         f"{path.relative_to(PACKAGE)}: {name}"
         for path in modules()
@@ -241,7 +241,7 @@ def notices(made: Bench) -> str:
 
 @pytest.mark.parametrize("key", kept("123567", "1", "3"))
 async def test_text_after_slash_is_searched(key: str) -> None:
-    """Typed at once on a slow machine, it was a key of the screen below: `a` armed."""
+    """Typed quickly on a slow machine, it was a key of the screen below: `a` armed."""
     async with bench("atv71") as made:
         await made.pilot.press(key)
         await until(made.pilot, lambda: KEY_OF[made.app.place] == key)
@@ -256,7 +256,7 @@ async def test_text_after_slash_is_searched(key: str) -> None:
 async def test_text_after_slash_is_searched_on_a_slow_computer(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """A screen that takes half a second to come let the `a` arm."""
+    """A screen that took half a second to open let the `a` arm."""
     compose = ParametersScreen.compose
 
     def slow(self: ParametersScreen) -> ComposeResult:
@@ -305,7 +305,7 @@ SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}
     ],
 )
 async def test_no_letter_writes_without_confirmation(screen: str) -> None:
-    """Armed, with work that waits to be written; a question that comes is left unanswered."""
+    """Armed, with pending work; a question that opens is left unanswered."""
     async with bench("atv71") as made:
         await stage(made)
         await made.pilot.press("2")

@@ -38,7 +38,7 @@ def ports(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @dataclass
 class Line:
-    """The panel on a line with simulated drives that is searched slowly, and what was opened."""
+    """The panel on a line with simulated drives and a slow scan, and the lines opened."""
 
     app: DrivePanelApp
     pilot: Pilot[None]
@@ -46,7 +46,7 @@ class Line:
     opened: list[str] = field(default_factory=list)
 
     async def searched(self) -> None:
-        """Wait until the search goes on."""
+        """Wait until the scan continues."""
         # at any address: a check every 50 ms may miss the first
         await until(
             self.pilot,

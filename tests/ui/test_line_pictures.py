@@ -61,7 +61,7 @@ def drive(device: int, looks: dict[int, Look], how: dict[str, int], age: float) 
 
 
 def wall(count: int, *, line: LineState = fakes.CONNECTED) -> fakes.StillFleet:
-    """So many drives; of more than 17 two are in fault, and the 17th tripped last."""
+    """This many drives; of more than 17 two are in fault, and the 17th tripped last."""
     looks: dict[int, Look] = {}
     drives = []
     for device in range(1, count + 1):

@@ -42,7 +42,7 @@ PERCENT = {"FD00": 3500, "FE02": 3500, "FE90": 1020, "FE03": 6270, "FE18": 4810,
 
 @dataclass(frozen=True)
 class Scene:
-    """A drive, as it was last read, and how it is commanded from here."""
+    """A drive with its last values, and its command state."""
 
     raws: Mapping[str, int] | None
     family: str = "atv71"

@@ -286,7 +286,7 @@ def test_no_bit_of_a_family_is_dim_while_its_words_are_true(family: str) -> None
 def test_quick_stop_bit_is_lit_only_in_states_where_it_counts(
     family: str, raw: int, lit: bool
 ) -> None:
-    """In Switch on disabled and Fault the state chart leaves bit 5 open: no quick stop goes on."""
+    """In Switch on disabled and Fault the state chart leaves bit 5 open: it is not a quick stop."""
     bit = next(item for item in library.load(family)["ETA"].bits if item.bit == 5)
     line = _bit_line(bit, raw, 40).plain
     assert ("● Quick stop active" in line) is lit

@@ -39,7 +39,7 @@ SEARCHES = ("ramp", "stt", "reaction", "input", "fault", "speed", "vitesse", "ti
 
 
 def table_width(width: int) -> int:
-    """Cells of the list of Parameters, beside the groups."""
+    """Cells of the list of Parameters, next to the groups."""
     return width if width < NARROW else width - (27 if width >= WIDE else 20)
 
 

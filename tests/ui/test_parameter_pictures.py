@@ -84,7 +84,7 @@ TEXTS_SHOWN: list[tuple[str, str]] = []
 
 
 def panel(console: DriveConsole) -> DrivePanelApp:
-    """The panel on that drive, whose events all bear the same time."""
+    """The panel on that drive; all its events have the same time."""
     app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     app.events = EventLog(lambda: WALL)
@@ -124,7 +124,7 @@ def refused(editor: Editor) -> None:
 
 
 def failed(editor: Editor) -> Applied:
-    """The limit was refused: what it limits is held back, the rest waits."""
+    """The limit was refused: values that depend on it are held back, the rest waits."""
     for code, text in (("TFR", "80"), ("HSP", "75"), ("ACC", "5.0"), ("DEC", "4.0")):
         editor.staging.stage(code, text)
     edits = {edit.code: edit for edit in editor.staging.edits}

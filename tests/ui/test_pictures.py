@@ -38,7 +38,7 @@ WATCH = TimeoutWatch(10.0, library.load("atv71").data.communication_fault.reacti
 
 
 def that_trip(shown: DriveConsole) -> fakes.StillFleet:
-    """Beside the drive that is shown two that watch the line."""
+    """Two drives with a timeout in addition to the one shown."""
     drives, alone = [FoundDrive(fakes.ATV71, shown)], {}
     for device, family, seconds, chosen in ((1, "atv21", 3.0, 0), (3, "atv71", 10.0, 1)):
         console = fakes.console_of(None, device=device, family=family)

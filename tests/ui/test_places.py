@@ -129,7 +129,7 @@ def test_parts_have_their_given_rows(profile_id: str, size: tuple[int, int]) -> 
 @settings(max_examples=40)
 @given(data=st.data())
 def test_numbers_and_units_are_aligned(profile_id: str, data: st.DataObject) -> None:
-    """Each column has its numbers to the right, and the units behind them."""
+    """Each column has right-aligned numbers, followed by the units."""
     profile = library.load(profile_id)
     room = room_of(profile, (80, 24))
     for _ in range(2):

@@ -1,4 +1,4 @@
-"""The line that runs a motor: what edits it, what closes it, and that Enter alone runs."""
+"""The run line: keys that edit it, keys that close it, and Enter alone runs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The search for drives goes on below other screens; addresses are changed in place."""
+"""The scan continues below other screens; addresses are changed in place."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 async def panel(
     *specs: DriveSpec, faults: FaultRates | None = None
 ) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]:
-    """The panel on a line of which it is not known who is there."""
+    """The panel on a line with unknown drives."""
     simulation = Simulation(list(specs), faults=faults)
     simulation.start()
     text = rtu_tcp(simulation)

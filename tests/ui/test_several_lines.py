@@ -1,4 +1,4 @@
-"""Several lines in one panel: one is shown, the drives of all are looked after and stopped."""
+"""Several lines in one panel: one is shown, the drives of all are kept alive and stopped."""
 
 from __future__ import annotations
 

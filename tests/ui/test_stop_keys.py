@@ -209,7 +209,7 @@ async def test_stop_reports_a_device_without_a_known_stop() -> None:
 async def test_stop_while_arming_leaves_the_drive_disarmed(
     monkeypatch: pytest.MonkeyPatch, passed: tuple[type, str]
 ) -> None:
-    """The keys are read in a thread of their own: a stop may come at any place of that way."""
+    """The keys are read in their own thread: a stop may arrive at any point of this code."""
     kind, name = passed
     async with bench("atv71") as made:
         goes_on, stops = getattr(kind, name), iter(["f12"])
@@ -251,7 +251,7 @@ PLANTED = (
 
 
 def waiting(app: DrivePanelApp) -> bool:
-    """True if a stop was not answered yet."""
+    """True if a stop was not acknowledged yet."""
     assert app.fleet is not None
     return any(
         not work.stop.sent and not work.stop.over for work in app.fleet.stopper._under_way.values()
@@ -285,7 +285,7 @@ async def test_error_after_a_stop_key_does_not_prevent_its_frame(
 
 
 async def test_not_stopped_message_is_never_covered() -> None:
-    """Armed, in a question and on each size: who runs it and where to stop it, to the last word."""
+    """Armed, in a question and on each size: its commander and where to stop it, uncut."""
     reported = (
         "drive 1: its command source is Terminals (Fr1), not Modbus. Stop it there or at the"
         " machine."

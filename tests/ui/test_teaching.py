@@ -32,7 +32,7 @@ async def pick(made: Bench, code: str) -> None:
 
 
 async def look(made: Bench, text: str) -> None:
-    """Type what the display shows, and Enter once the question has stood."""
+    """Type the display value, and Enter once the question accepts it."""
     await made.pilot.press(*text)
     await made.pilot.pause(0.4)
     await made.pilot.press("enter")
@@ -42,7 +42,7 @@ async def look(made: Bench, text: str) -> None:
 async def two_looks(
     made: Bench, code: str, first: tuple[int, str], second: tuple[int, str]
 ) -> None:
-    """Teach a value that Monitor offers; what the drive holds is set as a person would at it."""
+    """Learn the scale of a value on Monitor; the value of the drive is set at its keypad."""
     for raw, text in (first, second):
         made.drive().set(code, raw)
         await pick(made, code)

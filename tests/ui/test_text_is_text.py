@@ -82,7 +82,7 @@ async def typed(made: Bench, text: str) -> None:
 
 
 async def monitor(made: Bench) -> None:
-    """The line of a reference takes no such character: it closes, and nothing else happens."""
+    """The run line accepts no such character: it closes, and nothing else happens."""
     await made.armed()
     drive = made.app.chosen
     for character in ("left_square_bracket", "slash", "at", "right_square_bracket"):

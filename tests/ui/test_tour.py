@@ -1,4 +1,4 @@
-"""Every step of docs/tour.md on the demo, as printed: what is typed, and what is to be seen."""
+"""Every step of docs/tour.md on the demo, as printed: the keys, and the visible texts."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ QUOTES = 20
 
 
 def steps() -> list[tuple[list[str], list[str]]]:
-    """Keys, as Textual names them, with the texts that are quoted beside them."""
+    """Keys, as Textual names them, with the texts quoted next to them."""
     text = PAGE.read_text("utf-8")
     rows = [row for row in STEP.findall(text) if row[0] != "type" and "---" not in row[0]]
     return [([_key(key) for key in typed.split()], SEEN.findall(see)) for typed, see in rows]

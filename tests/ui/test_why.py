@@ -45,7 +45,7 @@ async def on_line(path: str) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]
 
 
 async def reported(app: DrivePanelApp, pilot: Pilot[None], words: str) -> str:
-    """Ask, and wait for what is found."""
+    """Start the diagnosis, and wait for its result."""
     await pilot.press("N")
     await until(pilot, lambda: isinstance(app.screen, WhyScreen))
     await until(pilot, lambda: words in shown(app, "reasons"))

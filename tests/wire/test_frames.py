@@ -1,4 +1,4 @@
-"""Frames and their checksum, beside the manuals, the simulator and the protocol library."""
+"""Frames and their checksum, compared with manuals, simulator and protocol library."""
 
 from __future__ import annotations
 

@@ -142,7 +142,7 @@ def test_truncated_reply_does_not_hide_the_next_request() -> None:
 
 @pytest.mark.parametrize("noise", [b"\x00", b"\x00\x5a", b"\x02\x10\x00"])
 def test_noise_just_before_a_request_does_not_hide_it(noise: bytes) -> None:
-    """An adapter has handed over both at once; the reply comes behind a silence."""
+    """An adapter has delivered both together; the reply follows a gap."""
     found = split(noise + READ, WORDS, pause=False)
     assert [frame.data for frame in found] == [noise, READ, WORDS]
 
