@@ -431,6 +431,6 @@ DEFECTS = (
         "            await look_for_drive(reader.session, error)\n",
         "",
         "A drive without a port's words counts as silent, so its polls and keep-alive reads wait.",
-        (f"{TIMEOUT}::test_timeout_is_read_again_after_a_silence",),
+        (f"{TIMEOUT}::test_known_word_is_read_after_an_unanswered_one",),
     ),
 )

@@ -124,7 +124,7 @@ def test_limit_source_is_read_before_a_write() -> None:
     assert limit_sources(ATV31, ["HSP"]) == {"LSP", "tFr"}
 
 
-def test_values_with_a_common_sum_are_written_smaller_first() -> None:
+def test_values_with_a_common_sum_are_written_decreasing_first() -> None:
     held = {"tA1": 10, "tA2": 90}
     edits = Edits().stage(ATV31, "tA1", "60", held).stage(ATV31, "tA2", "40", held)
     assert [edit.code for edit in ordered(ATV31, edits, held)] == ["tA2", "tA1"]

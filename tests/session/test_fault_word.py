@@ -121,7 +121,7 @@ def test_status_and_run_report_the_same_refusal() -> None:
     assert state_refusal(atv21, chart, "forward", {"FD01": 0x4000, "FC90": 24}) == IN_FAULT
 
 
-async def test_fault_word_does_not_block_a_stop() -> None:
+async def test_fault_word_does_not_mean_a_stopped_motor() -> None:
     """Settings that need standstill follow the status word if it says that the motor is enabled."""
     made = access(OwnDrive(held(RUNNING, 5)))
     session = made.session

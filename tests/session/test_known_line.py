@@ -174,7 +174,7 @@ def test_new_or_absent_drive_does_not_hold_the_line(adapters: Adapters) -> None:
     assert {*load_memory().lines[line_key(port)].drives} == {2, 3}
 
 
-def test_confirmed_drive_is_stored(adapters: Adapters) -> None:
+def test_confirmation_in_advance_covers_and_stores_the_next_drive(adapters: Adapters) -> None:
     port = adapters.plug("ttyUSB0", "1.1", serial="A5")
     known(on(port), PUMP)
     line = on(port)

@@ -270,7 +270,7 @@ def test_error_in_a_shared_row_is_reported_at_its_line(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["none.rows", "../ramps.rows", "/etc/hosts"])
-def test_shared_rows_are_beside_the_profile(tmp_path: Path, name: str) -> None:
+def test_shared_rows_outside_the_profile_folder_are_refused(tmp_path: Path, name: str) -> None:
     path = shared(tmp_path, "", f'rows_from = ["{name}"]')
     with pytest.raises(ProfileError, match=r"long\.toml:7: rows_from: "):
         library.load_file(path)

@@ -165,7 +165,7 @@ async def test_value_possibly_of_another_drive_is_read_again(
     assert {REFUSED, *(FIRST_SLOW + 100 * i for i in range(SLOW))} <= requested
 
 
-async def test_drive_in_fault_stays_resettable_after_a_failed_read(bench: Bench) -> None:
+async def test_refused_words_are_read_again_after_a_failure_in_fault(bench: Bench) -> None:
     bench.line.registers[STATE] = FAULT
     await bench.run(12)
     cycles = await bench.fail(silence(), cycles=10)

@@ -143,7 +143,7 @@ async def test_word_unanswered_twice_is_not_read_again() -> None:
     assert watch.code == "TTO"
 
 
-async def test_timeout_is_read_again_after_a_silence() -> None:
+async def test_known_word_is_read_after_an_unanswered_one() -> None:
     """Else it counts as silent, and polls and its feeding wait."""
     line = Ports({PORT: 20}, silent=TTO)
     await read_timeout(Reader(session_of(line, other_timeouts=["PORT"])), Priority.POLL)
@@ -163,7 +163,7 @@ async def test_family_that_refuses_by_silence_may_have_an_unknown_timeout() -> N
 
 
 @pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
-def test_late_reply_does_not_prove_presence(family: str) -> None:
+def test_presence_read_has_another_length_than_a_late_reply(family: str) -> None:
     ask = presence_read(library.load(family))
     assert ask is not None
     assert ask.count == 2

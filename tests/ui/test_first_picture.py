@@ -56,7 +56,7 @@ async def test_late_fields_do_not_change_the_first_picture(
         assert app.first == picture(app)
 
 
-async def test_focus_requests_do_not_wait_for_fields() -> None:
+async def test_form_values_do_not_wait_for_fields() -> None:
     app = DrivePanelApp()
     async with app.run_test() as pilot:
         form = app.connection.form

@@ -167,7 +167,7 @@ def taken() -> tuple[Fleet, DriveConsole]:
     return fleet, fleet.take(session)
 
 
-def test_drive_keeps_its_stop_if_another_drive_replaces_it() -> None:
+def test_console_stays_until_another_drive_replaces_it() -> None:
     fleet, console = taken()
     fleet.note(fakes.ATV71)
     assert fleet.consoles == [console]

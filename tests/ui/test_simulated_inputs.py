@@ -47,7 +47,7 @@ async def test_invalid_text_is_reported_and_sets_nothing() -> None:
         assert made.drive().terminals.bits() == 0
 
 
-async def test_input_key_does_nothing_on_a_real_line() -> None:
+async def test_input_key_is_refused_on_a_real_line() -> None:
     async with bench("atv312") as made:
         await made.pilot.press("l")
         await until(made.pilot, lambda: NOT_SIMULATED[:40] in output(made.app))
