@@ -59,7 +59,7 @@ async def stop_of(data: bytes) -> tuple[int, ...]:
     return (await plain_stop(reader, (0, 5, 9, 255), Peer(7, 0))).devices
 
 
-def heard_by(line: Line) -> list[Stop]:
+def later_stops(line: Line) -> list[Stop]:
     """Later stops by others that a program gets."""
     heard: list[Stop] = []
     on_event(
@@ -136,7 +136,7 @@ async def test_plain_stop_reaches_every_program_as_from_an_unattached_one(
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
         before = {line: line.facts.stops.stamp(3) for line in (owner, other)}
-        heard = [heard_by(owner), heard_by(other)]
+        heard = [later_stops(owner), later_stops(other)]
         due: list[tuple[tuple[int, ...], str]] = []
         on_event(owner.facts, StopDue, lambda event: due.append((event.devices, event.by)))
         assert await asyncio.to_thread(give, lines, b" 3 4\n") == GIVEN
@@ -158,7 +158,7 @@ async def test_plain_stop_of_all_stops_the_known_devices(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("panel")
-        heard = heard_by(owner)
+        heard = later_stops(owner)
         assert await asyncio.to_thread(give, lines, b" all\n") == GIVEN
         ((devices, _, _),) = heard
         assert devices == tuple(range(1, 10))
@@ -184,7 +184,7 @@ async def test_plain_stop_malformed_ends_its_connection_only(
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
-        heard = heard_by(owner)
+        heard = later_stops(owner)
         for form in NO_FORMS:
             if form != b" 2\n3\n":
                 assert await asyncio.to_thread(give, lines, form) == b""
@@ -200,7 +200,7 @@ async def test_plain_stop_of_another_user_is_refused(
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner = lines.open("panel")
-        heard = heard_by(owner)
+        heard = later_stops(owner)
         foreign = Peer(4711, os.getuid() + 4711)
         monkeypatch.setattr("tui.bus.share.greeting.peer_of", lambda _: foreign)
         assert await asyncio.to_thread(give, lines, b" 3\n") == b""
@@ -218,7 +218,7 @@ async def test_client_stops_by_a_separate_connection(share: Share) -> None:
         await client.read(1, 100)
         due: list[tuple[int, ...]] = []
         on_event(owner.facts, StopDue, lambda event: due.append(event.devices))
-        heard = heard_by(client)
+        heard = later_stops(client)
         assert client.facts.voice is not None
         await asyncio.to_thread(client.facts.voice.stop_directly, (1, 3))
         eventually(lambda: due == [(1, 3)])

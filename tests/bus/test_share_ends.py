@@ -435,10 +435,10 @@ async def test_repeated_attaching_leaves_nothing_behind(share: Share) -> None:
 async def test_program_closed_while_it_starts_listening_leaves_no_socket(
     share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    async def takes_long(*_: object, **__: object) -> None:
+    async def starts_slowly(*_: object, **__: object) -> None:
         await asyncio.sleep(60)
 
-    monkeypatch.setattr("tui.bus.share.greeting.asyncio.start_unix_server", takes_long)
+    monkeypatch.setattr("tui.bus.share.greeting.asyncio.start_unix_server", starts_slowly)
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         lines.open("hasty", wait=None)

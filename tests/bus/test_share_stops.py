@@ -49,10 +49,10 @@ async def send_stop(line: Line, device: int) -> float:
 def stop(line: Line, *devices: int) -> list[asyncio.Task[float]]:
     """A stop key: earlier writes are cancelled, and the stop is sent first."""
     line.facts.give_stop(devices, "the stop key")
-    return [asyncio.create_task(look_and_stop(line, device)) for device in devices]
+    return [asyncio.create_task(read_and_stop(line, device)) for device in devices]
 
 
-async def look_and_stop(line: Line, device: int) -> float:
+async def read_and_stop(line: Line, device: int) -> float:
     await line.read(device, 3, priority=Priority.STOP)
     return await line.write(device, 1, [STOP], priority=Priority.STOP)
 

@@ -215,7 +215,7 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
 
         wait_until(there, f"{wanted} in\n{terminal.text()}")
 
-    def goes_away(text: str) -> None:
+    def disappears(text: str) -> None:
         """The newest message takes more lines for a while; then only the screen says it."""
         wait_until(lambda: text not in terminal.text(), f"{text} goes away")
 
@@ -227,11 +227,11 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
     shows("1: Running since", "Open it: Space stops it, T takes it over.")
     terminal.press("1")
     terminal.wait_for("no comma")
-    goes_away("Open it:")
+    disappears("Open it:")
     shows("Press Enter: then Space stops it, T takes it over.")
     terminal.press("q")
     terminal.wait_for("Leave the panel?")
     shows("Device 1, Altivar 71: runs since", "Space stops it. To take it over: Esc, then T")
     terminal.press("Space")
     wait_until(lambda: killed.simulation.drive(1).motor.frequency == 0, "Space stops it there")
-    goes_away(killed.clause)
+    disappears(killed.clause)

@@ -189,9 +189,9 @@ def test_error_in_a_dialog_sends_the_stop_first(dialog: str, tmp_path: Path) -> 
 
 
 def test_every_dialog_is_tested() -> None:
-    from tests.ui.test_dialog_keys import dialogs_there_are
+    from tests.ui.test_dialog_keys import all_dialogs
 
-    assert dialogs_there_are() == set(DIALOGS)
+    assert all_dialogs() == set(DIALOGS)
 
 
 @pytest.mark.parametrize("name", PLACES)

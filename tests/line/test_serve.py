@@ -67,7 +67,7 @@ def programs() -> Iterator[ExitStack]:
         yield stack
 
 
-def run_beside(programs: ExitStack, made: Gateway) -> Served:
+def second_run(programs: ExitStack, made: Gateway) -> Served:
     """`run` at work on the line that `serve` owns."""
     runner = programs.enter_context(served(runs_a_motor(made.line), ready="running forward"))
     wait_until(lambda: turns(made.simulation), "the motor turns")
@@ -79,7 +79,7 @@ def run_beside(programs: ExitStack, made: Gateway) -> Served:
 
 def test_pymodbus_and_modbus_tk_read_while_a_program_commands(programs: ExitStack) -> None:
     with gateway("--fresh", "1") as made:
-        run_beside(programs, made)
+        second_run(programs, made)
         with made.client() as client:
             read = client.read_holding_registers(STATUS, count=2, device_id=1)
             assert not read.isError()
@@ -102,7 +102,7 @@ def test_pymodbus_and_modbus_tk_read_while_a_program_commands(programs: ExitStac
 def test_mbpoll_reads_and_stops_while_a_program_commands(programs: ExitStack, peer: Peer) -> None:
     mbpoll = peer("mbpoll", "mbpoll")
     with gateway() as made:
-        runner = run_beside(programs, made)
+        runner = second_run(programs, made)
 
         def poll(address: int, *values: str) -> subprocess.CompletedProcess[str]:
             options = ["-m", "tcp", "-p", str(made.port), "-a", "1", "-0", "-1", "-t", "4"]
@@ -143,7 +143,7 @@ def test_modbus_serial_writes_what_is_allowed(node: str) -> None:
 
 def test_run_word_is_exception_6_while_a_program_commands(programs: ExitStack) -> None:
     with gateway("--allow-commands", "--allow-writes", "all") as made:
-        runner = run_beside(programs, made)
+        runner = second_run(programs, made)
         with made.client() as client:
             before = made.simulation.drive(1).raw("LFR")
             for address, word in ((COMMAND, 0x080F), (REFERENCE, 50), (ACCELERATION, 57)):
@@ -297,7 +297,7 @@ def test_motor_of_a_client_is_stopped_if_serve_is_killed(programs: ExitStack) ->
 
 def test_serve_stops_a_motor_left_by_another_program(programs: ExitStack) -> None:
     with gateway() as made:
-        runner = run_beside(programs, made)
+        runner = second_run(programs, made)
         runner.process.kill()
         wait_until(lambda: stands(made.simulation), "the motor stops")
         assert made.simulation.drive(1).fault is None

@@ -119,11 +119,11 @@ def test_stop_of_the_motor_of_a_frozen_program_lasts(
         assert done.returncode == 0, done.stderr
         assert stopped_by_commands(simulation)
         before = simulation.drive(1).raw("CMD")
-        goes_on_stopped(simulation, runner)
+        resumes_stopped(simulation, runner)
         assert simulation.drive(1).raw("CMD") == before
 
 
-def goes_on_stopped(simulation: Simulation, runner: Served) -> None:
+def resumes_stopped(simulation: Simulation, runner: Served) -> None:
     """A frozen `run` resumes, learns that its motor was stopped, and sends only stops."""
     runner.process.send_signal(signal.SIGCONT)
     output, _ = runner.process.communicate(timeout=PATIENCE)
@@ -247,7 +247,7 @@ def test_stop_delayed_by_a_frozen_owner_is_reported_and_carried_out(
         )
         assert what in done.stderr
         if number is signal.SIGCONT:
-            goes_on_stopped(simulation, runner)
+            resumes_stopped(simulation, runner)
         else:
             runner.process.kill()
             wait_until(lambda: stopped_by_commands(simulation), "the motor stops")

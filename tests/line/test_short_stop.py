@@ -44,7 +44,7 @@ def panel(with_keepers: None) -> Iterator[OpenLine]:
         yield opened
 
 
-def stops_heard(facts: SharedState) -> list[tuple[tuple[int, ...], Program, bool]]:
+def stops_received(facts: SharedState) -> list[tuple[tuple[int, ...], Program, bool]]:
     """Later stops by others: their devices, their program, and True if it is attached."""
     heard: list[tuple[tuple[int, ...], Program, bool]] = []
 
@@ -56,7 +56,7 @@ def stops_heard(facts: SharedState) -> list[tuple[tuple[int, ...], Program, bool
 
 
 def test_stop_reaches_the_keeper_before_anything_is_imported(panel: OpenLine) -> None:
-    heard = stops_heard(panel.line.facts)
+    heard = stops_received(panel.line.facts)
     command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", panel.text, "-d", "1", "-d", "3"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert "ModuleNotFoundError" in done.stderr
@@ -84,7 +84,7 @@ def test_stop_all_is_carried_out_by_the_keeper() -> None:
 
 
 def test_stop_after_a_short_stop_is_carried_out_and_reported_normally(panel: OpenLine) -> None:
-    heard = stops_heard(panel.line.facts)
+    heard = stops_received(panel.line.facts)
     done = drivepanel("stop", panel.text, "-d", "1", "-p", "atv71")
     assert done.returncode == 0, done.stderr
     assert "Altivar 71: stopped." in done.stdout
@@ -95,7 +95,7 @@ def test_stop_after_a_short_stop_is_carried_out_and_reported_normally(panel: Ope
 
 
 def test_other_kinds_of_stop_are_not_short_stops(panel: OpenLine) -> None:
-    heard = stops_heard(panel.line.facts)
+    heard = stops_received(panel.line.facts)
     for words in (["--quick"], ["--read-only"], ["--all", "--addresses", "1-2"]):
         command = [sys.executable, "-c", WITHOUT_IMPORTS, "stop", panel.text, *words]
         subprocess.run(command, capture_output=True, timeout=PATIENCE, check=False)

@@ -133,20 +133,20 @@ def test_blocked_terminal_does_not_stop_polling(
         terminal = terminal_with(panel_over(ssh_host, tmp_path, line, "-d", "2"))
         terminal.wait_for("FORWARD", "Hz")
         panel = int((tmp_path / "pid").read_text())
-        assert not _stands_still(panel)
+        assert not _is_frozen(panel)
         with stopped(terminal.client(), _parent(panel)):
             # neither end of the session reads now; the panel sends so little that it would take
             # a minute until it could write no more, so the terminal is filled beforehand
             began = time.monotonic()
             _fill_terminal_of(panel)
-            wait_until(lambda: _stands_still(panel), "the panel cannot write any more")
+            wait_until(lambda: _is_frozen(panel), "the panel cannot write any more")
             time.sleep(max(0.0, STALL - (time.monotonic() - began)))
             before = counter.requests
             wait_until(
                 lambda: counter.requests >= before + MORE_REQUESTS,
                 f"{MORE_REQUESTS} more requests while the terminal stands still",
             )
-            assert _stands_still(panel)
+            assert _is_frozen(panel)
         terminal.wait_for("FORWARD", "Hz")
         stale = terminal.text()
         wait_until(lambda: terminal.text() != stale, "the screen goes on after the stall")
@@ -235,7 +235,7 @@ def _fill_terminal_of(pid: int) -> None:
         os.close(terminal)
 
 
-def _stands_still(pid: int) -> bool:
+def _is_frozen(pid: int) -> bool:
     """True if a process wrote nothing to files and terminals for two seconds."""
     before = _written(pid)
     time.sleep(2)

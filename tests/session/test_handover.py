@@ -102,7 +102,7 @@ async def bench() -> AsyncIterator[Bench]:
     made.close()
 
 
-def commanded_there(bench: Bench) -> None:
+def commanded_by_another(bench: Bench) -> None:
     bench.facts.note_commander(1, REMOTE.id)
 
 
@@ -132,7 +132,7 @@ async def test_arming_claims_the_drive_and_disarming_releases_it(bench: Bench) -
 async def test_drive_of_another_commander_is_not_armed_and_names_it(
     bench: Bench,
 ) -> None:
-    commanded_there(bench)
+    commanded_by_another(bench)
     with pytest.raises(CommandedElsewhere, match=r"commanded by panel on pts/9 \(pid 77\)"):
         bench.session.arming.arm()
     assert not bench.session.arming.armed
@@ -148,7 +148,7 @@ async def test_expired_arming_releases_the_drive(bench: Bench) -> None:
 
 async def test_denied_claim_disarms_with_its_reason(bench: Bench) -> None:
     bench.session.arming.arm()
-    commanded_there(bench)
+    commanded_by_another(bench)
     bench.facts.events.emit(ControlDenied(1, "Drive 1 is commanded by panel on pts/9 (pid 77)."))
     assert not bench.session.arming.armed
     assert "pts/9" in bench.session.arming.refusal()
@@ -306,11 +306,11 @@ async def test_drive_of_another_commander_does_not_run(
 ) -> None:
     bench.session.note_command()
     bench.starts.begin(bench.session, "forward")
-    commanded_there(bench)
+    commanded_by_another(bench)
     assert bench.session.commanded  # its motor was started here, and its standstill is not known
     bench.facts.note_commander(1, None)
     bench.starts.give_away(bench.session)
-    commanded_there(bench)
+    commanded_by_another(bench)
     assert not bench.session.commanded
     bench.session.note_command()
     bench.facts.events.emit(ControlRequested(1, REMOTE))
@@ -319,7 +319,7 @@ async def test_drive_of_another_commander_does_not_run(
 
 
 async def test_request_is_sent_and_its_answer_reported(bench: Bench) -> None:
-    commanded_there(bench)
+    commanded_by_another(bench)
     bench.handover.ask_for(1)
     assert bench.voice.output == [("ask", 1)]
     bench.facts.hear_reply(1, "Drive 1 is commanded by panel.", yes=False)
@@ -341,7 +341,7 @@ async def test_granted_running_motor_belongs_to_this_program(
     bench: Bench, status: int, adopted: int
 ) -> None:
     """From then on its end stops it, and a kill of it is found."""
-    commanded_there(bench)
+    commanded_by_another(bench)
     bench.shows(status)
     bench.facts.hear_reply(1, "", yes=True)
     await asyncio.sleep(0.1)

@@ -64,7 +64,7 @@ async def shown(teacher: Teacher, code: str = "HZ") -> str:
     return f"{value.display}{' taught' if value.taught else ''}"
 
 
-async def two_looks(line: OneDrive, teacher: Teacher) -> None:
+async def two_readings(line: OneDrive, teacher: Teacher) -> None:
     """Teach HZ: 0.1 Hz a count."""
     line.registers[500] = 300
     assert (await teacher.look("HZ", "30.0", "Hz")).kind is LessonKind.FIRST
@@ -75,7 +75,7 @@ async def two_looks(line: OneDrive, teacher: Teacher) -> None:
 async def test_value_has_its_unit_from_the_second_reading_on() -> None:
     line, teacher = drive()
     assert await shown(teacher) == "0"
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     assert await shown(teacher) == "50.3 Hz taught"
     assert teacher.session.profile["HZ"].unit == "Hz"
     assert teacher.session.family["HZ"].unit == "", "the family learns nothing"
@@ -84,7 +84,7 @@ async def test_value_has_its_unit_from_the_second_reading_on() -> None:
 
 async def test_learned_scale_is_stored_for_line_and_device() -> None:
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     _, later = drive(HZ=250)
     assert await shown(later) == "25.0 Hz taught"
     elsewhere = Teacher(DriveSession(OneDrive({500: 250}, device=2), 2, PROFILE))
@@ -94,7 +94,7 @@ async def test_learned_scale_is_stored_for_line_and_device() -> None:
 
 async def test_other_drive_at_the_address_does_not_get_the_scale() -> None:
     line, teacher = drive(NAMED)
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     _, other = drive(OTHER, HZ=250)
     assert await shown(other) == "250"
     _, same = drive(NAMED, HZ=250)
@@ -106,14 +106,14 @@ async def test_other_drive_at_the_address_does_not_get_the_scale() -> None:
 async def test_unidentified_drive_gets_no_scale_if_two_were_learned() -> None:
     for who in (NAMED, OTHER):
         line, teacher = drive(who)
-        await two_looks(line, teacher)
+        await two_readings(line, teacher)
     _, unsaid = drive(None, HZ=250)
     assert await shown(unsaid) == "250"
 
 
 async def test_disagreeing_third_reading_discards_the_stored_scale() -> None:
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     line.registers[500] = 400
     lesson = await teacher.look("HZ", "20.0")
     assert lesson.kind is LessonKind.ENDED
@@ -124,7 +124,7 @@ async def test_disagreeing_third_reading_discards_the_stored_scale() -> None:
 
 async def test_unknown_sign_leaves_the_word_raw() -> None:
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     line.registers[500] = 65036
     assert await shown(teacher) == "65036 raw"
     assert (await teacher.look("HZ", "-50.0")).kind is LessonKind.AGREES
@@ -147,7 +147,7 @@ async def test_invalid_number_is_refused_before_any_request() -> None:
 
 async def test_forgetting_removes_the_learned_scale() -> None:
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     assert teacher.forget("HZ")
     assert not teacher.forget("HZ")
     assert await shown(teacher) == "503"
@@ -158,7 +158,7 @@ async def test_forgetting_removes_the_learned_scale() -> None:
 async def test_scales_learned_by_two_programs_are_kept() -> None:
     line, teacher = drive()
     other_line, other = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     other_line.registers[400] = 84
     await other.look("AMPS", "8.4", "A")
     other_line.registers[400] = 120
@@ -215,7 +215,7 @@ async def test_value_without_a_scale_or_preset_is_refused() -> None:
     line, teacher = drive()
     with pytest.raises(ValueRefused, match="not learned yet"):
         teacher.confirm_reference("PRESET")
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     with pytest.raises(ValueRefused, match="Use PRESET"):
         teacher.confirm_reference("HZ")
 
@@ -313,7 +313,7 @@ HOSTILE = {
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
 async def test_damaged_file_is_reported_and_kept(folder: Path, text: str) -> None:
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     path = kept(folder)
     path.write_text(text, "utf-8")
     line, teacher = drive(HZ=250)
@@ -321,7 +321,7 @@ async def test_damaged_file_is_reported_and_kept(folder: Path, text: str) -> Non
     assert "are not used" in teacher.trouble
     assert await shown(teacher) == "250"
     assert path.read_text("utf-8") == text, "looking at it changes nothing"
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     assert teacher.trouble == ""
     assert kept(folder, "damaged1").read_text("utf-8") == text
     assert await shown(drive(HZ=250)[1]) == "25.0 Hz taught"
@@ -329,7 +329,7 @@ async def test_damaged_file_is_reported_and_kept(folder: Path, text: str) -> Non
 
 async def test_contradicting_readings_give_no_scale(folder: Path) -> None:
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     path = kept(folder)
     reported = json.loads(path.read_text("utf-8"))
     reported["looks"]["HZ"][1]["shown"] = "70.0 Hz"
@@ -339,7 +339,7 @@ async def test_contradicting_readings_give_no_scale(folder: Path) -> None:
 
 async def test_unknown_code_is_kept_but_not_used(folder: Path) -> None:
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     path = kept(folder)
     reported = json.loads(path.read_text("utf-8"))
     reported["looks"]["GONE"] = reported["looks"]["HZ"]
@@ -357,7 +357,7 @@ async def test_unwritable_folder_is_reported_and_the_scale_is_used(
 ) -> None:
     (folder / "taught").write_text("in the way")
     line, teacher = drive()
-    await two_looks(line, teacher)
+    await two_readings(line, teacher)
     assert "are lost when" in teacher.trouble
     assert await shown(teacher) == "50.3 Hz taught"
 

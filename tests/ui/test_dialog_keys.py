@@ -111,7 +111,7 @@ DIALOGS: dict[str, Make] = {
 }
 
 
-def dialogs_there_are() -> set[str]:
+def all_dialogs() -> set[str]:
     """Every dialog of the panel, by the name of its class."""
     for module in pkgutil.walk_packages(tui.screens.__path__, "tui.screens."):
         importlib.import_module(module.name)
@@ -130,7 +130,7 @@ def dialogs_there_are() -> set[str]:
 
 
 def test_every_dialog_is_tested() -> None:
-    assert dialogs_there_are() == {name.partition(" ")[0] for name in DIALOGS}
+    assert all_dialogs() == {name.partition(" ")[0] for name in DIALOGS}
 
 
 def bottom(app: DrivePanelApp) -> str:

@@ -59,7 +59,7 @@ IS_EARLY = Question._is_early
 
 
 @pytest.fixture
-def slow_hands(monkeypatch: pytest.MonkeyPatch, quick_hands: None) -> None:
+def real_key_delay(monkeypatch: pytest.MonkeyPatch, quick_hands: None) -> None:
     """Questions as they are outside of tests."""
     monkeypatch.setattr(Question, "_is_early", IS_EARLY)
 
@@ -106,7 +106,7 @@ YES: dict[str, tuple[Callable[[], Question[Any]], str, object]] = {
 }
 
 
-@pytest.mark.usefixtures("slow_hands")
+@pytest.mark.usefixtures("real_key_delay")
 @pytest.mark.parametrize("name", YES)
 async def test_early_key_does_not_answer(name: str) -> None:
     make, key, answer = YES[name]
@@ -131,7 +131,7 @@ async def test_early_key_does_not_answer(name: str) -> None:
             assert requested.answers == [answer]
 
 
-@pytest.mark.usefixtures("slow_hands")
+@pytest.mark.usefixtures("real_key_delay")
 @pytest.mark.parametrize(("key", "answer"), [("s", "stop"), ("escape", "stay"), ("q", "stay")])
 async def test_stop_and_no_apply_immediately(key: str, answer: str) -> None:
     requested = OpenQuestion(Leave("it runs"))
@@ -151,7 +151,7 @@ async def test_three_keys_answer_no(key: str, loses: bool) -> None:
         await until(pilot, lambda: requested.answers == [False])
 
 
-@pytest.mark.usefixtures("slow_hands")
+@pytest.mark.usefixtures("real_key_delay")
 async def test_typed_text_does_not_answer_a_new_question() -> None:
     requested = OpenQuestion(confirm(by_itself=True))
     async with requested.app.run_test(size=(80, 24)) as pilot:

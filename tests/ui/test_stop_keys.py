@@ -214,14 +214,14 @@ async def test_stop_while_arming_leaves_the_drive_disarmed(
     async with bench("atv71") as made:
         goes_on, stops = getattr(kind, name), iter(["f12"])
 
-        def behind_a_stop(*given: Any, **named: Any) -> Any:
+        def after_a_stop(*given: Any, **named: Any) -> Any:
             # drawing reads the commander, too, and may do so before the key
             if sys._getframe(1).f_code.co_name == "action_arm":
                 for key in stops:
                     made.app.take_stop_key(key)
             return goes_on(*given, **named)
 
-        monkeypatch.setattr(kind, name, behind_a_stop)
+        monkeypatch.setattr(kind, name, after_a_stop)
         await made.pilot.press("a")
         await made.stopped()
         assert made.app.chosen is not None

@@ -39,7 +39,7 @@ async def look(made: Bench, text: str) -> None:
     await until(made.pilot, lambda: not isinstance(made.app.screen, Ask))
 
 
-async def two_looks(
+async def two_readings(
     made: Bench, code: str, first: tuple[int, str], second: tuple[int, str]
 ) -> None:
     """Learn the scale of a value on Monitor; the value of the drive is set at its keypad."""
@@ -54,7 +54,7 @@ async def test_two_readings_set_the_scale_and_a_disagreeing_third_discards_it() 
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot
         assert "Output ?" in shown(app, "readouts")
-        await two_looks(made, "5.01", (300, "30.0Hz"), (503, "50.3"))
+        await two_readings(made, "5.01", (300, "30.0Hz"), (503, "50.3"))
         await until(pilot, lambda: "Output taught" in shown(app, "readouts"))
         await until(pilot, lambda: "Hz" in shown(app, "readouts"))
         assert "Current ?" in shown(app, "readouts"), "it was not taught"
