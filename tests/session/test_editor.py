@@ -289,6 +289,27 @@ async def test_setting_restored_to_its_saved_value_counts_as_saved() -> None:
         assert editor.unsaved == set()
 
 
+async def test_old_values_are_staged_again_after_they_were_unstaged() -> None:
+    async with editing("atv71") as (made, editor):
+        await write(made, editor, "ACC", "7.5 s")
+        await write(made, editor, "DEC", "8 s")
+        staging = editor.staging
+        for _ in range(2):
+            assert staging.stage_old() == "2 old values are staged."
+            assert {(edit.code, edit.new) for edit in staging.edits} == {("ACC", 30), ("DEC", 30)}
+            staging.undo("DEC")
+            staging.undo("ACC")
+            assert len(staging.edits) == 0
+        staging.stage_old()
+        staging.undo_all()
+        assert staging.stage_old() == "2 old values are staged."
+        # a value that the drive holds again is not an old one
+        made.drive.set("DEC", 30)
+        await made.until(lambda: made.session.image.raws["DEC"] == 30)
+        staging.undo_all()
+        assert staging.stage_old() == "1 old value is staged."
+
+
 async def test_setting_changed_by_another_source_counts_as_unsaved() -> None:
     async with editing("atv71") as (made, editor):
         await write(made, editor, "ACC", "7.5 s")

@@ -24,7 +24,9 @@ class Staging:
     """Returns True while something is being written; then nothing can be staged."""
     edits: Edits = field(default_factory=Edits)
     results: dict[str, Result] = field(default_factory=dict)
-    """Result of the last write of each parameter."""
+    """Result of the last write of each parameter; none once it is staged again."""
+    _before: dict[str, int] = field(default_factory=dict)
+    """Raw value of each written parameter before its last write."""
 
     @property
     def _raws(self) -> Mapping[str, int]:
@@ -71,10 +73,9 @@ class Staging:
 
     def stage_old(self) -> str:
         """Stage the values before the last write; return the result as text."""
-        done = [result.edit for result in self.results.values() if result.done]
-        olds = [(edit.code, edit.old) for edit in done if edit.old is not None]
+        olds = {c: old for c, old in self._before.items() if self._raws.get(c) != old}
         staged = 0
-        for code, old in olds:
+        for code, old in olds.items():
             with suppress(ValueRefused):
                 self.stage_raw(code, old)
                 staged += 1
@@ -118,7 +119,10 @@ class Staging:
 
     def take_result(self, result: Result) -> None:
         """Note the result of one edit."""
-        self.results = {**self.results, result.edit.code: result}
+        edit = result.edit
+        self.results = {**self.results, edit.code: result}
+        if result.done and edit.old is not None:
+            self._before[edit.code] = edit.old
 
     def drop_written(self) -> list[str]:
         """Unstage the values that the drive has; return their codes."""
