@@ -296,7 +296,11 @@ def test_gate_runs_tests_that_the_test_command_omits() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     options = settings["tool"]["pytest"]["ini_options"]
     assert options["addopts"].endswith(" -m 'not sweep'")
-    assert [marker.partition(":")[0] for marker in options["markers"]] == ["sweep", "drawn"]
+    assert [marker.partition(":")[0] for marker in options["markers"]] == [
+        "sweep",
+        "drawn",
+        "internal_errors",
+    ]
     layer = ".venv/bin/python -m pytest -q -n 10"
     assert f"{layer} -m sweep" in README
     assert re.search(rf"^layer {layer} .*-m sweep$", CI.read_text("utf-8"), re.MULTILINE)
