@@ -193,6 +193,15 @@ def test_bit_in_columns_has_its_subject() -> None:
     assert "In force" not in reported
 
 
+@pytest.mark.parametrize("code", ["ETA", "LRS6", "UNT"])
+def test_name_of_a_bit_is_whole_while_a_column_is_empty(code: str) -> None:
+    view = view_of(ATV71, {**fakes.RUNNING, code: 0})
+    (page,) = word_pages([ATV71[code]], 33)
+    grid = "\n".join(line.plain for line in bit_grid(view, page, 79, 12))
+    missing = [bit.name for bit in page.bits if bit.name not in grid and bit.name[:12] in grid]
+    assert missing == []
+
+
 def test_answers_of_the_last_minute_have_the_lower_edge() -> None:
     view = view_of(ATV71, fakes.RUNNING)
     for minute, text, style in (

@@ -32,6 +32,7 @@ from tui.widgets.palette import STOP_KEY
 
 from . import fakes
 
+ATV71 = library.load("atv71")
 PROFILES = [listing.id for listing in library.listings()]
 
 
@@ -99,6 +100,15 @@ def test_parts_fill_the_terminal_exactly(width: int, height: int, count: int) ->
     band = room.band + 1 if room.band else 0
     assert 1 + room.plot + band + room.axis == room.curve
     assert room.plot >= 3
+
+
+def test_slow_link_gets_one_curve_and_two_readouts() -> None:
+    room = arrange(120, 40, 9, lean=True)
+    assert room.band == 0
+    assert room.plot >= 16
+    parts = monitor_parts(view_of(ATV71, fakes.RUNNING), room, [])
+    assert "Torque" not in parts["readouts"][room.lead].plain
+    assert "Torque" in " ".join(line.plain for line in parts["motor"])
 
 
 @pytest.mark.parametrize("family", PROFILES)

@@ -38,11 +38,18 @@ class Arrangement:
     curve: int
     """The curve with its heading and axis, or a table in its place."""
     bottom: int
+    lean: bool = False
+    """True if as little as possible is sent: no third readout, no second curve."""
 
     @property
     def wide(self) -> bool:
-        """True if there is a third readout, and tables of bits are side by side."""
+        """True if tables of bits are side by side."""
         return self.width >= WIDE
+
+    @property
+    def third(self) -> bool:
+        """True if there is a third readout."""
+        return self.wide and not self.lean
 
     @property
     def lead(self) -> int:
@@ -63,7 +70,9 @@ class Arrangement:
     def band(self) -> int:
         """Rows of the band of the current, without the line above it; 0 for none."""
         rows = self.curve - 1 - self.axis
-        return max(BAND_LEAST, min(BAND_MOST, rows // 4)) if rows >= BAND_FROM else 0
+        return (
+            max(BAND_LEAST, min(BAND_MOST, rows // 4)) if rows >= BAND_FROM and not self.lean else 0
+        )
 
     @property
     def plot(self) -> int:
@@ -72,7 +81,7 @@ class Arrangement:
         return self.curve - 1 - self.axis - (band + 1 if band else 0)
 
 
-def arrange(width: int, height: int, count: int) -> Arrangement:
+def arrange(width: int, height: int, count: int, *, lean: bool = False) -> Arrangement:
     """The parts in a terminal of that size, for a drive with so many values.
 
     The curve gets the rows that the others leave.
@@ -87,4 +96,5 @@ def arrange(width: int, height: int, count: int) -> Arrangement:
         columns = max(1, -(-count // max(1, values)))  # room for whole names
     top = READOUT_ROWS + int(very)
     bottom = 1 + int(room >= ROOMY) + int(very)
-    return Arrangement(width, height, top, values, columns, room - top - values - bottom, bottom)
+    curve = room - top - values - bottom
+    return Arrangement(width, height, top, values, columns, curve, bottom, lean)

@@ -73,11 +73,11 @@ WordTable = tuple[WordPage, ...]
 def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
     """Return the lines of each place, in exactly its number of rows."""
     lead = [Text("")] * room.lead
-    readouts = readout_lines(view, room.width - room.state_width - 1, wide=room.wide)
+    readouts = readout_lines(view, room.width - room.state_width - 1, wide=room.third)
     return {
         "readouts": lead + readouts,
         "state": lead + framed_state(view, room.state_width),
-        "motor": motor_lines(view, room.width, room.values, room.columns, wide=room.wide),
+        "motor": motor_lines(view, room.width, room.values, room.columns, wide=room.third),
         "curve": curve_or_table(view, room, words),
         "message": bottom_lines(view, room, words),
     }
@@ -102,7 +102,7 @@ def curve_or_table(view: View, room: Arrangement, words: Sequence[Parameter]) ->
 
 def tables(profile: Profile, room: Arrangement, words: Sequence[Parameter]) -> list[WordTable]:
     """Return the tables that Tab shows one after the other."""
-    values = other_values(profile, wide=room.wide)
+    values = other_values(profile, wide=room.third)
     found: list[WordTable] = [()] if len(values) > room.values * room.columns else []
     if not room.wide:
         most = bit_columns(room.width - 1) * (room.curve - 1)
@@ -117,9 +117,9 @@ def _table_lines(view: View, room: Arrangement, table: WordTable) -> list[Text]:
     following = Text.assemble(("  Tab", KEY), (" next", FAINT))
     if not table:
         columns = max(1, width // WIDE_VALUE_COLUMN)
-        rows = -(-len(other_values(view.profile, wide=room.wide)) // columns)
+        rows = -(-len(other_values(view.profile, wide=room.third)) // columns)
         heading = Text(" ").append_text(rule("All values", width - NEXT_CELLS))
-        lines = motor_lines(view, width, min(rows, room.curve - 1), columns, wide=room.wide)
+        lines = motor_lines(view, width, min(rows, room.curve - 1), columns, wide=room.third)
         rest = [Text("")] * (room.curve - 1 - len(lines))
         return [heading.append_text(following), *lines, *rest]
     if len(table) == 1 and not room.wide:

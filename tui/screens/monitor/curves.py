@@ -361,10 +361,11 @@ def _read_out(view: View, moment: float, width: int) -> Text:
     head = Text(f" {clock_text(at + view.apart)}", PLAIN if found is not None else STALE)
     line = head.append_text(text)
     line.no_wrap = True
-    keys = Text.assemble(("← →", KEY), (" move ", FAINT), ("Esc", KEY), (" close ", FAINT))
-    if line.cell_len + keys.cell_len < width:
-        line.append(" " * (width - line.cell_len - keys.cell_len))
-        line.append_text(keys)
+    close = Text.assemble(("Esc", KEY), (" close ", FAINT))
+    for keys in (Text.assemble(("← →", KEY), (" move ", FAINT)).append_text(close), close):
+        if line.cell_len + keys.cell_len < width:
+            line.append(" " * (width - line.cell_len - keys.cell_len))
+            return line.append_text(keys)
     return line
 
 

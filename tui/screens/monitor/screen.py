@@ -170,8 +170,10 @@ class MonitorScreen(CursorKeys):
 
     def _room(self) -> Arrangement:
         """Return the number of rows of each part."""
-        wide = self.size.width >= WIDE
-        return arrange(*self.size, len(other_values(self.session.profile, wide=wide)))
+        lean = self.app.low_bandwidth
+        third = self.size.width >= WIDE and not lean
+        count = len(other_values(self.session.profile, wide=third))
+        return arrange(*self.size, count, lean=lean)
 
     def _place(self, room: Arrangement) -> None:
         """Give each part its rows; the layout runs again only if they change."""
@@ -230,6 +232,7 @@ class MonitorScreen(CursorKeys):
     def action_trend_window(self, step: int) -> None:
         """A longer or shorter page of time."""
         self.time_cursor = self.time_cursor.with_span(step)
+        self._word = None
         self.look()
 
     def action_next_word(self) -> None:

@@ -167,13 +167,17 @@ def bit_columns(width: int) -> int:
 
 
 def bit_grid(view: View, page: WordPage, width: int, height: int) -> list[Text]:
-    """A word with its bits in columns: a heading, then as many rows as there are."""
+    """A word with its bits in columns: a heading, then as many rows as there are.
+
+    There are no more columns than the bits need, so that each name has as much room as possible.
+    """
     raw, _ = _raw(view, page.parameter)
-    columns = bit_columns(width)
+    columns = max(1, min(bit_columns(width), -(-len(page.bits) // max(1, height - 1))))
     cells, rows = (width - 1) // columns, height - 1
     lines = [Text(" ", no_wrap=True) for _ in range(rows)]
+    filled = -(-len(page.bits) // columns)
     for at, bit in enumerate(page.bits):
-        lines[at % rows].append_text(_bit_line(bit, raw, cells))
+        lines[at % filled].append_text(_bit_line(bit, raw, cells))
     heading = Text(" ", no_wrap=True).append_text(_heading(view, page, width - 14))
     heading.append("  ")
     heading.append_text(Text.assemble(("Tab", KEY), (" next", FAINT)))
