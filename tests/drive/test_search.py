@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +16,7 @@ from tui.drive.profile import json_schema, library
 from tui.drive.profile.schema import FamilySearch, FamilyTopic, SearchTopic, SearchWords
 from tui.drive.profile.search import (
     ParameterSearch,
+    Score,
     parameter_search,
     plain_letters,
     search_words,
@@ -115,6 +116,22 @@ def test_too_many_words_show_what_fits_most_of_them() -> None:
     assert found("atv21", "motor pole count")[0] == "F856"
     assert found("atv71", "zzz") == []
     assert found("atv71", "zzz yyy xxx") == []
+
+
+def test_long_text_is_searched_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    search = parameter_search(library.load("varmeca"))
+    searched: list[object] = []
+    best_phrases = search._best_phrases
+
+    def counted(words: Iterable[str]) -> Mapping[str, Score]:
+        searched.append(words)
+        return best_phrases(words)
+
+    monkeypatch.setattr(search, "_best_phrases", counted)
+    assert search.scores("zz " * 400) == {}
+    assert len(searched) == 1
+    assert search.scores("zz yy xx ww vv") == {}
+    assert len(searched) < 20
 
 
 def test_number_and_address_find_their_parameter() -> None:

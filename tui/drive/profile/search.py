@@ -18,6 +18,9 @@ from .search_file import Topic, Vocabulary, read_vocabulary
 SHORTEST_BEGINNING = 3
 """Letters of a word from which its beginning finds a topic or a name."""
 
+MOST_OPTIONAL_WORDS = 5
+"""Words of which some may be omitted: each choice costs a search, in the thread of the keys."""
+
 _WORD = re.compile(r"[a-z0-9+%]+")
 
 Phrase = frozenset[str]
@@ -126,7 +129,8 @@ class ParameterSearch:
         if found := self._fitting(raw, words or (raw,)):
             return found
         found = {}
-        for omitted in range(1, len(words) // 2 + 1):
+        most = len(words) // 2 if len(words) <= MOST_OPTIONAL_WORDS else 0
+        for omitted in range(1, most + 1):
             for kept in combinations(words, len(words) - omitted):
                 for code, score in self._best_phrases(kept).items():
                     found[code] = min(score, found.get(code, score))
