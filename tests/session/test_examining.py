@@ -182,7 +182,7 @@ async def test_nothing_is_sent_while_another_master_is_active() -> None:
         found = await found_on(line)
         assert found.rung == "other-master"
         assert line.counters.requests == 0
-        assert any("address 2" in step for step in found.steps)
+        assert any("Address 2" in step for step in found.steps)
 
 
 async def test_only_swapped_bytes_are_reported() -> None:

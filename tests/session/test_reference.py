@@ -175,7 +175,7 @@ async def test_run_in_any_unit_turns_the_motor_at_the_typed_value(
         (VOLTS, "20Hz", "REF takes its reference in V. Type it like 5V"),
         (HERTZ, "40%", "REF takes its reference in Hz or rpm. Type it like 30Hz"),
         (HERTZ, "5V", "in Hz or rpm."),
-        (PERCENT_OF_FULL, "5V", "in % or Hz or rpm."),
+        (PERCENT_OF_FULL, "5V", "in %, Hz or rpm."),
     ],
 )
 async def test_reference_in_an_unknown_unit_is_refused(
