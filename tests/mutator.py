@@ -30,7 +30,7 @@ SPELLED: Mapping[type[ast.cmpop], str] = {
 }  # fmt: skip
 FOR_TYPES = {"cast", "TypeVar", "NewType", "ParamSpec", "dataclass", "overload", "Literal"}
 """Names whose arguments or items change nothing that runs."""
-SYMMETRIC = {"max", "min", "isclose", "gcd"}
+SYMMETRIC = {"max", "min", "isclose", "gcd", "suppress"}
 """Functions whose result does not depend on the order of their arguments."""
 KINDS = (
     "condition", "boundary", "constant", "text", "argument", "call", "await", "lock", "raise",

@@ -41,7 +41,11 @@ FOLDERS = {"screens": "ui", "keeper": "session"}
 """By package: the folder of its tests, if it has another name."""
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-random-defects.json"
 NOT_RECORDED = {
-    "tui/keeper/*": ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py"),
+    "tui/keeper/*": (
+        "tests/session/test_keeper_end.py",
+        "tests/line/test_keeper.py",
+        "tests/line/test_hung_keepers.py",
+    ),
     "tui/screens/*/registration.py": ("tests/ui/test_key_pages.py", "tests/ui/test_palette.py"),
     "tui/screens/blocks/registration.py": ("tests/ui/test_block_pictures.py",),
     "tui/screens/connection/registration.py": ("tests/ui/test_line_pictures.py",),

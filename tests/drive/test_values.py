@@ -308,3 +308,54 @@ def test_each_type_has_its_range(type: str, low: int, high: int) -> None:
 
 def test_field_has_the_range_of_its_mask() -> None:
     assert type_range(parameter(mask=7, shift=4)) == (0, 7)
+
+
+@pytest.mark.parametrize(
+    ("fields", "raw", "held", "words"),
+    [
+        ({"type": "uint16"}, 65536, None, "P: 65536 does not fit uint16"),
+        ({"type": "int16"}, -32769, None, "P: -32769 does not fit int16"),
+        ({"mask": 0x0F, "shift": 4}, 3, None, "P is a part of a word"),
+        ({"mask": 0x0F, "shift": 4}, 16, 0, "P: 16 does not fit"),
+    ],
+)
+def test_raw_value_that_does_not_fit_its_words_is_refused_with_the_reason(
+    fields: dict[str, object], raw: int, held: int | None, words: str
+) -> None:
+    with pytest.raises(ValueRefused, match=words):
+        to_words(parameter(**fields), raw, held)
+
+
+@given(held=st.integers(0, 0xFFFF), raw=st.integers(0, 15), shift=st.integers(0, 12))
+def test_field_keeps_the_other_bits_of_its_word(held: int, raw: int, shift: int) -> None:
+    p = parameter(mask=0x0F, shift=shift)
+    (word,) = to_words(p, raw, held)
+    assert 0 <= word <= 0xFFFF
+    assert from_words(p, [word]) == raw
+    others = [bit for bit in range(16) if not shift <= bit < shift + 4]
+    assert all(word >> bit & 1 == held >> bit & 1 for bit in others)
+
+
+@pytest.mark.parametrize(("low_first", "words"), [(False, (0x0001, 0x0002)), (True, (2, 1))])
+def test_value_of_32_bits_has_its_words_in_the_order_of_the_drive(
+    low_first: bool, words: tuple[int, int]
+) -> None:
+    p = parameter(type="uint32", low_word_first=low_first)
+    assert to_words(p, 0x0001_0002) == words
+    assert from_words(p, words) == 0x0001_0002
+
+
+def test_refusal_names_the_first_four_names() -> None:
+    names = {number: f"name {number}" for number in range(6)}
+    p = parameter(values={str(number): text for number, text in names.items()})
+    with pytest.raises(ValueRefused) as refused:
+        encode(p, "what", names, Decimal(1))
+    assert str(refused.value) == "P: 'what' is not one of name 0, name 1, name 2, name 3."
+
+
+@pytest.mark.parametrize(
+    ("percent", "rating", "value"),
+    [("50", "4.0", "2.0"), ("33.3", "4.00", "1.33"), ("12.5", "10", "1"), ("15", "10", "2")],
+)
+def test_percentage_has_the_decimals_of_its_rating(percent: str, rating: str, value: str) -> None:
+    assert str(percent_of(Decimal(percent), Decimal(rating))) == value

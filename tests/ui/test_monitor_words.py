@@ -14,7 +14,7 @@ from tui.screens.command.control import Control, hindrance
 from tui.screens.monitor.assembly import NOTICE_ROWS, notice_lines
 from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
-from tui.screens.monitor.state import state_lines
+from tui.screens.monitor.state import _timeout, countdown, state_lines
 from tui.screens.monitor.words import (
     WordPage,
     _bit_line,
@@ -300,3 +300,60 @@ def test_quick_stop_bit_is_lit_only_in_states_where_it_counts(
     line = _bit_line(bit, raw, 40).plain
     assert ("● Quick stop active" in line) is lit
     assert lit or "active" not in line
+
+
+@pytest.mark.parametrize(
+    ("heard", "text"),
+    [(95.0, "reacts in 5 s: its own reaction"), (80.0, "has reacted by now: its own reaction")],
+)
+def test_reaction_of_an_unpolled_drive_is_counted_down(heard: float, text: str) -> None:
+    view = replace(
+        view_of(ATV71, fakes.RUNNING, age=50.0),
+        now=100.0,
+        heard=heard,
+        watch=TimeoutWatch(10.0, None),
+        line=fakes.LOST,
+    )
+    assert countdown(view) == text
+    assert countdown(replace(view, watch=None)) == ""
+
+
+@pytest.mark.parametrize(
+    ("age", "text"),
+    [
+        (-1.0, "<1 s"),
+        (0.99, "<1 s"),
+        (1.0, "1 s"),
+        (99.0, "99 s"),
+        (100.0, "2m"),
+        (5999.0, "100m"),
+        (6000.0, "2h"),
+    ],
+)
+def test_timeout_is_shown_with_the_age_of_the_last_answer(age: float, text: str) -> None:
+    watch = TimeoutWatch(10.0, None)
+    view = replace(view_of(ATV71, fakes.RUNNING), now=9000.0, heard=9000.0 - age, watch=watch)
+    assert _timeout(view, 40)[0] == f"10 s, polled {text}"
+
+
+@pytest.mark.parametrize(("age", "late"), [(5.0, False), (5.1, True)])
+def test_half_of_the_timeout_without_an_answer_is_marked(age: float, late: bool) -> None:
+    watch = TimeoutWatch(10.0, None)
+    view = replace(view_of(ATV71, fakes.RUNNING), now=100.0, heard=100.0 - age, watch=watch)
+    assert _timeout(view, 40)[1] == (STALE if late else PLAIN)
+
+
+@pytest.mark.parametrize(
+    ("watch", "width", "text"),
+    [
+        (None, 40, "none known"),
+        (TimeoutWatch(0.5, None), 40, "0.5 s"),
+        (TimeoutWatch(10.0, None, active=False), 60, "10 s, starts when commanded"),
+        (TimeoutWatch(10.0, None, active=False), 22, "10 s, off"),
+    ],
+)
+def test_timeout_of_a_drive_that_was_not_polled_yet(
+    watch: TimeoutWatch | None, width: int, text: str
+) -> None:
+    view = replace(view_of(ATV71, fakes.RUNNING), watch=watch, heard=None)
+    assert _timeout(view, width)[0] == text
