@@ -232,3 +232,101 @@ def test_reply_that_is_like_its_request_has_no_remark_of_an_echo() -> None:
     data = frame(1, write.pdu())
     result = ExchangeResult(ResultKind.REPLY, pdu=write.pdu(), received=data + data)
     assert [note for _, note in noted(result, data, 1)] == ["", ""]
+
+
+@pytest.mark.parametrize(
+    ("request_", "characters"), [(READ, 9), (Read(1, 5, 125), 255), (WriteOne(1, 5, 7), 8)]
+)
+def test_longest_reply_is_that_of_the_request_after_an_echo(
+    request_: Request, characters: int
+) -> None:
+    echo = len(frame(1, request_.pdu()))
+    assert exchange_of(request_).longest == characters
+    assert exchange_of(request_, echo=False).longest == characters
+    assert exchange_of(request_, echo=True).longest == echo + characters
+    assert exchange_of(Identify(1)).longest == 256
+
+
+@pytest.mark.parametrize("words", [1, 2, 60])
+@pytest.mark.parametrize("echo", [True, False])
+def test_reply_that_has_begun_is_awaited_to_its_end(words: int, echo: bool) -> None:
+    """As long as it may be a refusal, only to the end of that."""
+    request = Read(1, 5, words)
+    reply = frame(1, honest_pdu(request.pdu()))
+    for count in range(len(reply)):
+        exchange = exchange_of(request, echo=echo)
+        exchange.feed((frame(1, request.pdu()) if echo else b"") + reply[:count])
+        is_certain = count >= 3 or (words == 1 and count)
+        due = len(reply) - count if is_certain else 5 - count if count else 0
+        assert exchange.missing == due, count
+
+
+@pytest.mark.parametrize(
+    "received", [b"\x02", b"\x01\x04", b"\x01\x83", OTHER[:4], b"\x01\x03\x05"]
+)
+def test_nothing_is_missing_of_bytes_that_begin_no_reply(received: bytes) -> None:
+    exchange = exchange_of(READ, echo=False)
+    exchange.feed(received)
+    assert exchange.missing == 0
+
+
+def test_nothing_is_missing_while_an_earlier_reply_is_skipped() -> None:
+    exchange = exchange_of(READ, echo=False, skip=1)
+    exchange.feed(REPLY[:4])
+    assert exchange.missing == 0
+
+
+@pytest.mark.parametrize("skip", [0, 1, 2])
+def test_earlier_replies_are_skipped_one_by_one(skip: int) -> None:
+    exchange = exchange_of(READ, skip=skip)
+    for _ in range(skip):
+        assert exchange.feed(REPLY) is None
+    result = exchange.feed(REPLY)
+    assert result is not None
+    assert (result.kind, result.pdu) == (ResultKind.REPLY, RIGHT)
+
+
+@pytest.mark.parametrize("exceptions", [True, False])
+def test_refusal_is_not_skipped_and_counts_only_if_it_is_the_own(exceptions: bool) -> None:
+    result = exchange_of(READ, skip=1, exceptions=exceptions).feed(frame(1, REFUSED))
+    assert (result is not None) is exceptions
+    if result is not None:
+        assert (result.kind, result.exception, result.pdu) == (ResultKind.EXCEPTION, 2, REFUSED)
+
+
+def test_reply_of_an_earlier_request_is_passed_over() -> None:
+    exchange = exchange_of(READ, echo=False)
+    first, second = (frame(1, bytes([3, 4, 0, number, 0, 0])) for number in (1, 2))
+    result = exchange.feed(first)
+    assert result is not None
+    assert exchange.pass_over(result) is None
+    following = exchange.feed(second)
+    assert following is not None
+    assert following.pdu == second[1:-2]
+
+
+def test_reply_after_a_flood_of_noise_is_found_in_bounded_memory() -> None:
+    exchange = exchange_of(READ)
+    for _ in range(100):
+        assert exchange.feed(b"\x55" * 199) is None
+        assert len(exchange.buffer) <= 4096
+    result = exchange.feed(REPLY)
+    assert result is not None
+    assert result.pdu == RIGHT
+
+
+def test_broadcast_has_no_reply() -> None:
+    exchange = RtuExchange(frame(0, WriteOne(0, 5, 7).pdu()), None)
+    assert not exchange.expected
+    assert exchange.feed(REPLY) is exchange.silent() is None
+    assert exchange_of(READ).expected
+
+
+@pytest.mark.parametrize(
+    ("received", "known"),
+    [([SENT, REPLY], True), ([REPLY], False), ([b"\x33", REPLY], None)],
+)
+def test_exchange_shows_if_the_adapter_echoes(received: list[bytes], known: bool | None) -> None:
+    exchange = exchange_of(READ)
+    assert exchange.feed(b"".join(received)) is not None
+    assert exchange.echo is known
