@@ -46,6 +46,7 @@ NOT_RECORDED = {
         "tests/line/test_keeper.py",
         "tests/line/test_hung_keepers.py",
     ),
+    "tui/cli/derived.py": ("tests/cli/test_derived.py",),
     "tui/screens/*/registration.py": ("tests/ui/test_key_pages.py", "tests/ui/test_palette.py"),
     "tui/screens/blocks/registration.py": ("tests/ui/test_block_pictures.py",),
     "tui/screens/connection/registration.py": ("tests/ui/test_line_pictures.py",),

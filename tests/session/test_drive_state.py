@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any, cast
+
 import pytest
 
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
+from tui.session.drive import DriveSession
 from tui.session.drive_state import channel_text, drive_state
 from tui.session.reading import Reading
 from tui.session.shown import Quality
 
-from .fakes import parameter, profile_of
+from .fakes import OneDrive, parameter, profile_of
 
 CHART = {
     "id": "drivecom",
@@ -113,3 +117,30 @@ def test_channel_word_is_decoded_by_its_bits() -> None:
 
 def test_values_without_the_status_word_give_no_state() -> None:
     assert drive_state(drive(), readings(drive(), LFT=18)).headline == ""
+
+
+@pytest.mark.parametrize(
+    ("motion", "may_have_stood", "stands"),
+    [
+        ("running", False, False),
+        ("stopping", False, False),
+        ("unknown", True, False),
+        ("ready", True, True),
+        ("fault", True, True),
+    ],
+)
+def test_motor_that_runs_or_still_stops_does_not_stand(
+    motion: str, may_have_stood: bool, stands: bool
+) -> None:
+    """The record of its start is kept until it is at standstill."""
+    session = DriveSession(OneDrive({10: 1}), 1, profile_of(parameter("P10", 10)))
+    reported: list[float] = []
+    session.starts = cast(
+        Any, SimpleNamespace(standing=lambda _session, time: reported.append(time))
+    )
+    session.rest_seen = 40.0
+    session.note_state(motion, 50.0)
+    assert session.rest_seen == (50.0 if may_have_stood else 40.0)
+    assert reported == ([50.0] if stands else [])
+    session.note_state("ready", 45.0)
+    assert session.rest_seen == (50.0 if may_have_stood else 45.0), "never an earlier time"

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from hypothesis import given
@@ -10,9 +12,11 @@ from hypothesis import strategies as st
 from rich.cells import cell_len
 
 from tests.drive.test_fault_reset import BY_TERMINALS
+from tui.bus.api import LineState, LineStatus
 from tui.drive.fault_reset import not_in_command
 from tui.drive.profile import library
 from tui.screens.frame import TABS, message_lines
+from tui.screens.frame_source import FrameSource
 from tui.screens.keys.action import MONITOR
 from tui.screens.keys.screens import TABBED
 from tui.session.command.commander import STILL_IN_FAULT
@@ -237,3 +241,27 @@ def test_unwritable_journal_is_shown_and_moves_nothing(width: int, faults: int) 
         assert cells_before(line.plain, part) == cells_before(before, part)
     assert "NO JOURNAL" in strip_line(StripView(line="sim:atv71", off_record=True), width).plain
     assert "JOURNAL" not in before
+
+
+@pytest.mark.parametrize(
+    ("status", "reason", "next_try", "text"),
+    [
+        (LineStatus.CONNECTED, "", None, ""),
+        (LineStatus.CLOSED, "", None, ""),
+        (LineStatus.CONNECTING, "", None, "CONNECTING for 12 s."),
+        (LineStatus.CONNECTING, "Waiting.", None, "CONNECTING for 12 s. Waiting."),
+        (LineStatus.LOST, "Unplugged.", None, "LINE LOST for 12 s: Unplugged."),
+        (LineStatus.LOST, "Gone.", 103.0, "LINE LOST for 12 s: Gone. Retrying in 3 s."),
+        (LineStatus.LOST, "Gone.", 99.0, "LINE LOST for 12 s: Gone. Retrying in 0 s."),
+    ],
+)
+def test_line_that_cannot_be_used_is_named_with_its_time(
+    status: LineStatus, reason: str, next_try: float | None, text: str
+) -> None:
+    state = LineState(status, reason, 88.0, next_try)
+    opened = cast(Any, SimpleNamespace(line=SimpleNamespace(state=state)))
+    source = cast(Any, SimpleNamespace(_app=SimpleNamespace(opened=opened)))
+    assert FrameSource._line_trouble(source, 100.0) == text
+    source._app.opened = None
+    assert FrameSource._line_trouble(source, 100.0) == ""
+    assert FrameSource._line_trouble(source, 100.0, opened) == text
