@@ -32,8 +32,11 @@ WITHOUT_LOCK = {
     "Engine._end": ("_workers", "only the loop of the line changes it"),
     "Engine._work": ("_main", "only the loop of the line changes it"),
     "Fleet._look_for_left": ("_departed", "replaced as a whole"),
-    "HeardLine._listen": ("trouble", "replaced as a whole"),
-    "HeardLine.open": ("_families _hearing _stack _thread link", "before its thread begins"),
+    "BackgroundListener._listen": ("trouble", "replaced as a whole"),
+    "BackgroundListener.open": (
+        "_families _hearing _stack _thread link",
+        "before its thread begins",
+    ),
     "LineWatch._glance": ("_looks", "replaced as a whole"),
     "LineWatch.stop": ("_looks", "replaced as a whole"),
     "OrphanMotorGuard._ended_by_loss": ("_lost", "only its own thread uses it"),

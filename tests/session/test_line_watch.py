@@ -43,7 +43,7 @@ PROFILE = profile_of(
 )
 
 
-class HeardLine(OneDrive):
+class BackgroundListener(OneDrive):
     """Record the priority of reads of the drive, and keep its workers."""
 
     def __init__(self, tenths: int) -> None:
@@ -80,7 +80,7 @@ class Kept:
     """A watched drive with this many tenths of a second to its timeout."""
 
     def __init__(self, tenths: int) -> None:
-        self.line = HeardLine(tenths)
+        self.line = BackgroundListener(tenths)
         session = DriveSession(self.line, 1, PROFILE)
         self.watch = LineWatch(self.line)
         self.watch.keep(session, Monitor(session))
@@ -106,7 +106,7 @@ async def keep() -> AsyncIterator[Callable[[int], Kept]]:
         await kept.end()
 
 
-def kept_alive(line: HeardLine) -> list[KeepAlive]:
+def kept_alive(line: BackgroundListener) -> list[KeepAlive]:
     """Devices that the holder of the line keeps alive."""
     return line.facts.keep_alives.of(line.facts.me.id)
 
@@ -149,7 +149,7 @@ async def test_drive_without_a_timeout_is_neither_kept_alive_nor_reported(
 
 
 async def test_drive_of_unknown_family_is_kept_alive_until_it_is_known() -> None:
-    line = HeardLine(20)
+    line = BackgroundListener(20)
     strangers = UnknownDrivePoller(line)
     strangers.keep(7)
     await until(lambda: kept_alive(line) != [])

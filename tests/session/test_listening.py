@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 import pytest
 
-from tests.wire.test_heard import (
+from tests.wire.test_observed import (
     COMMAND,
     IDENTIFY,
     READ,

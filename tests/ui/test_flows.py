@@ -22,7 +22,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.frame_list import FEW
-from tui.screens.frames.heard import HeardScreen
+from tui.screens.frames.heard import ListeningScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.action import OPENING
 from tui.screens.keys.help import HelpScreen
@@ -243,7 +243,7 @@ def test_every_action_has_a_method_and_a_text() -> None:
         BlocksScreen,
         MessagesScreen,
         WiringScreen,
-        HeardScreen,
+        ListeningScreen,
     )
     owners: dict[str, type] = {(screen.TITLE or "line").lower(): screen for screen in screens}
     owners[OPENING] = OpeningScreen

@@ -16,14 +16,14 @@ from tui.app import DrivePanelApp
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.drive.profile import library
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.frames.heard import HeardScreen
+from tui.screens.frames.heard import ListeningScreen
 from tui.screens.hear import why_not_hear
 from tui.session.connect import address_prober
 from tui.session.connect.identify import DriveIdentity
 from tui.session.fleet import Fleet, FoundDrive
-from tui.session.listening.background import HeardLine
+from tui.session.listening.background import BackgroundListener
 from tui.session.listening.families import Families
-from tui.session.listening.hearing import Hearing
+from tui.session.listening.port_listener import PortListener
 from tui.session.listening.summary import ListeningSummary
 from tui.simulator import DriveSpec, Simulation
 from tui.wire.frames import frame, read_frame
@@ -61,7 +61,7 @@ def talk(peer: PtyPeer) -> None:
 
 async def heard(app: DrivePanelApp, pilot: Pilot[None], peer: PtyPeer) -> None:
     """H was pressed: the screen is open, and shows the traffic."""
-    await until(pilot, lambda: isinstance(app.screen, HeardScreen))
+    await until(pilot, lambda: isinstance(app.screen, ListeningScreen))
     talk(peer)
     await until(pilot, lambda: "6 write LFR ← 30.0 Hz" in shown(app, "frames"))
     assert "← 6 ETA 16#0637" in shown(app, "frames")
@@ -91,7 +91,7 @@ async def test_closed_line_is_monitored_and_released() -> None:
             assert peer.requests == []
             # the port is free again immediately
             await pilot.press("H")
-            await until(pilot, lambda: isinstance(app.screen, HeardScreen))
+            await until(pilot, lambda: isinstance(app.screen, ListeningScreen))
             await pilot.press("1")
             await until(pilot, lambda: app.screen is app.connection and not app.hearing)
 
@@ -100,13 +100,13 @@ async def test_second_key_while_opening_leaves_no_monitor_behind(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """A slow computer opens it for a while: a second listener would keep the port for ever."""
-    opens, may_open = HeardLine.open, threading.Event()
+    opens, may_open = BackgroundListener.open, threading.Event()
 
-    def slow(heard: HeardLine) -> None:
+    def slow(heard: BackgroundListener) -> None:
         may_open.wait(10)
         opens(heard)
 
-    monkeypatch.setattr(HeardLine, "open", slow)
+    monkeypatch.setattr(BackgroundListener, "open", slow)
     with PtyPeer(silent) as peer:
         app = DrivePanelApp()
         async with app.run_test(size=(80, 24)) as pilot:
@@ -116,7 +116,7 @@ async def test_second_key_while_opening_leaves_no_monitor_behind(
             await pilot.press("H")
             await until(pilot, lambda: "keys are ignored until it is open" in output(app))
             may_open.set()
-            await until(pilot, lambda: isinstance(app.screen, HeardScreen))
+            await until(pilot, lambda: isinstance(app.screen, ListeningScreen))
             await pilot.press("H")
             await until(pilot, lambda: "listens already" in output(app))
             await pilot.press("escape")
@@ -247,7 +247,7 @@ def test_reasons_that_block_monitoring_are_named() -> None:
 # How it looks
 
 
-class StillHearing(HeardLine):
+class StillHearing(BackgroundListener):
     """Recorded traffic: the same frames and figures each time."""
 
     def __init__(self) -> None:
@@ -256,8 +256,8 @@ class StillHearing(HeardLine):
         place = cast("Any", type("Place", (), {"link": self.link, "character": 11 / 19200}))
         place.silence = 3.5 * 11 / 19200
         self._families = Families([library.load(text) for text in ("atv21", "atv71")])
-        self._hearing = Hearing(place, self._families, lambda _: None, self._keep)
-        self._hearing.listener.tally.begun = fakes.NOW - 30
+        self._port_listener = PortListener(place, self._families, lambda _: None, self._keep)
+        self._port_listener.listener.tally.begun = fakes.NOW - 30
         for number in range(12):
             self._say(fakes.NOW - 24 + 2 * number)
 
@@ -273,11 +273,11 @@ class StillHearing(HeardLine):
         for number, (request, reply) in enumerate(cycle):
             for part, data in enumerate((request, reply)):
                 if data:
-                    self._hearing.take(data, at + 0.05 * number + 0.02 * part)
-        self._hearing.take(b"", at + 1.5)
+                    self._port_listener.take(data, at + 0.05 * number + 0.02 * part)
+        self._port_listener.take(b"", at + 1.5)
 
     def summary(self) -> ListeningSummary:
-        return self._hearing.summary(fakes.NOW)
+        return self._port_listener.summary(fakes.NOW)
 
     def close(self) -> None:
         """Nothing was opened."""
@@ -290,7 +290,7 @@ def test_pictures(snap_compare: Callable[..., bool], page: str, size: tuple[int,
     app.hearing = "serial:/dev/ttyUSB0,19200,8E1"
 
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(HeardScreen(StillHearing()))
+        await app.push_screen(ListeningScreen(StillHearing()))
         await pilot.pause()
         if page == "sum":
             await pilot.press("tab", "tab")

@@ -93,14 +93,14 @@ async def _ask_to_hear(app: Panel, text: str, profile: str) -> None:
 
 
 async def _listen(app: Panel, text: str, profile: str) -> None:
-    from tui.session.listening.background import HeardLine
+    from tui.session.listening.background import BackgroundListener
 
-    from .frames.heard import HeardScreen
+    from .frames.heard import ListeningScreen
 
     app.action_goto("line")
     try:
         named = await asyncio.to_thread(_named, profile)
-        heard = HeardLine(text, "panel", named)
+        heard = BackgroundListener(text, "panel", named)
         opening = asyncio.ensure_future(asyncio.to_thread(heard.open))
         try:
             await asyncio.shield(opening)
@@ -112,7 +112,7 @@ async def _listen(app: Panel, text: str, profile: str) -> None:
         app.hearing = ""
         app.say_first(str(error), "Enter opens the line; H tries to listen again.", "error")
         return
-    app.push_screen(HeardScreen(heard))
+    app.push_screen(ListeningScreen(heard))
 
 
 def _named(profile: str) -> dict[int | None, Profile] | None:

@@ -14,15 +14,15 @@ import click
 from tui.bus.listening_line import ListeningLine
 from tui.session.capture_file import CaptureFile
 from tui.session.listening.families import Families
-from tui.session.listening.hearing import Hearing
 from tui.session.listening.listener import DecodedExchange
+from tui.session.listening.port_listener import PortListener
 from tui.session.signals import BY_SIGNAL, signal_name
-from tui.wire.heard.splitting import HeardFrame
+from tui.wire.observed.splitting import ObservedFrame
 
 from ..shared.completion import complete_line, complete_profile
 from ..shared.errors import INTERRUPTED, LINE_TROUBLE, USAGE, Failure
 from ..shared.line_argument import LineArgument
-from ..shared.listen_outputs import HeardOutput
+from ..shared.listen_outputs import ListenOutput
 from ..shared.numbers import seconds
 from ..shared.options import json_option
 from ..shared.registration import command
@@ -99,7 +99,7 @@ def listen(
     from tui.session.listening.families import Families, remembered_families
     from tui.session.listening.place import line_to_listen
 
-    from ..shared.listen_outputs import HeardJson, HeardLines
+    from ..shared.listen_outputs import ListenJsonOutput, ListenTextOutput
 
     with (
         never_suspended(),
@@ -107,7 +107,7 @@ def listen(
         _serial_line(line_to_listen(line_text, PROGRAM_NAME)) as place,
     ):
         families = Families(known_profiles(), named, remembered_families(place.line.link))
-        output = HeardJson(line_text, families) if as_json else HeardLines(families)
+        output = ListenJsonOutput(line_text, families) if as_json else ListenTextOutput(families)
         file = _opened_file(pcap_path, line_text, raw=raw, force=force)
         listening = HearingRun(place.line, families, output, file)
         try:
@@ -136,12 +136,12 @@ def _serial_line(
     opening: AbstractContextManager[PlaceToListen],
 ) -> Iterator[PlaceToListen]:
     """The line that is meant; raises UsageError if it is not a serial line."""
-    from tui.session.listening.place import NothingToHear
+    from tui.session.listening.place import CannotListen
 
     with ExitStack() as stack:
         try:
             place = stack.enter_context(opening)
-        except NothingToHear as error:
+        except CannotListen as error:
             raise click.UsageError(str(error)) from None
         yield place
 
@@ -195,19 +195,19 @@ class HearingRun:
         self,
         line: ListeningLine,
         families: Families,
-        output: HeardOutput,
+        output: ListenOutput,
         file: CaptureFile | None = None,
     ) -> None:
         self._output = output
         self._file = file
         self._wall = time.time() - time.monotonic()
         """Offset from the monotonic clock to seconds since 1970."""
-        self._hearing = Hearing(line, families, self._tell, self._keep)
+        self._listener = PortListener(line, families, self._tell, self._keep)
 
     @property
     def text(self) -> str:
         """Summary of the traffic and of the files, in a sentence."""
-        tally = self._hearing.listener.tally
+        tally = self._listener.listener.tally
         text = f"Heard {tally.exchanges} exchanges in {tally.frames} frames"
         if self._file is None:
             return f"{text}."
@@ -223,21 +223,21 @@ class HearingRun:
                 self._sum_up(now)
                 next_sum += every or 0.0
             left = min(until, next_sum) - now
-            self._hearing.take(*self._hearing.read(left))
+            self._listener.take(*self._listener.read(left))
 
     def end(self) -> None:
         """Report open requests, and the summary."""
         now = time.monotonic()
-        self._hearing.end(now)
+        self._listener.end(now)
         self._sum_up(now)
 
     def _tell(self, exchange: DecodedExchange) -> None:
         self._output.exchange(exchange, exchange.exchange.time + self._wall)
 
     def _sum_up(self, now: float) -> None:
-        self._output.summary(self._hearing.summary(now), now + self._wall)
+        self._output.summary(self._listener.summary(now), now + self._wall)
 
-    def _keep(self, frame: HeardFrame, request: bool | None) -> None:
+    def _keep(self, frame: ObservedFrame, request: bool | None) -> None:
         """Write a frame to the file, if there is one."""
         if self._file is None:
             return

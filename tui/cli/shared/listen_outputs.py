@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tui.session.listening.listener import DecodedExchange
     from tui.session.listening.summary import DriveSummary, ListeningSummary
     from tui.session.listening.tally import ReadTally, WriteTally
-    from tui.session.listening.words import HeardValue, WordSpan
+    from tui.session.listening.words import ObservedValue, WordSpan
 
     from ..documents.listening_documents import (
         FeedingField,
@@ -32,7 +32,7 @@ FURTHER = 25
 """Indent of continuation lines."""
 
 
-class HeardOutput(Protocol):
+class ListenOutput(Protocol):
     """Takes exchanges and summaries; `wall` is a time in seconds since 1970."""
 
     def exchange(self, reported: DecodedExchange, wall: float) -> None:
@@ -42,7 +42,7 @@ class HeardOutput(Protocol):
         """Put a summary out."""
 
 
-class HeardLines:
+class ListenTextOutput:
     """Readable text: a line an exchange."""
 
     def __init__(self, families: Families) -> None:
@@ -71,7 +71,7 @@ class HeardLines:
         say()
 
 
-class HeardJson:
+class ListenJsonOutput:
     """One object a line on standard output."""
 
     def __init__(self, line_text: str, families: Families) -> None:
@@ -132,7 +132,7 @@ def exchange_document(
     )
 
 
-def heard_value_field(value: HeardValue) -> HeardValueField:
+def heard_value_field(value: ObservedValue) -> HeardValueField:
     """One value; that of a name or a bit word is its raw number."""
     from ..documents.listening_documents import HeardValueField
     from .output import plain_number

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from tui.bus.api import Frame
 from tui.session.listening.words import FUNCTION_NAMES
 from tui.wire.frames import pdu_of
-from tui.wire.heard.pairing import BROADCAST_DEVICE
+from tui.wire.observed.pairing import BROADCAST_DEVICE
 
 from .decoded import EXCEPTION_BIT
 

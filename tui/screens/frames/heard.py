@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from rich.text import Text
 
-from tui.session.listening.background import HeardLine
+from tui.session.listening.background import BackgroundListener
 from tui.session.listening.summary import ListeningSummary, summary_lines
 from tui.widgets.drawing import rule, wrapped
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
@@ -58,14 +58,14 @@ def _sentence(text: str, width: int) -> list[Text]:
     ]
 
 
-class HeardScreen(FrameListScreen):
+class ListeningScreen(FrameListScreen):
     """The frames of other masters and their drives; then who commands which, and how well."""
 
     CSS_PATH = "frames.tcss"
     BINDINGS: ClassVar = bindings(LISTENING)
     TITLE = "Listening"
 
-    def __init__(self, heard: HeardLine) -> None:
+    def __init__(self, heard: BackgroundListener) -> None:
         super().__init__()
         self._heard = self._source = heard
         self._heading = "Listening, nothing is sent"

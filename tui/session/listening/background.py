@@ -11,16 +11,16 @@ from tui.bus.errors import LineError
 from tui.bus.link import Link
 from tui.bus.trace import Frame, Trace
 from tui.drive.profile.profile import Profile
-from tui.wire.heard.splitting import HeardFrame
+from tui.wire.observed.splitting import ObservedFrame
 
 from ..connect.address_prober import known_profiles
 from .families import Families, remembered_families
-from .hearing import Hearing
 from .listener import DecodedExchange
 from .place import PlaceToListen, line_to_listen
+from .port_listener import PortListener
 from .summary import ListeningSummary
 
-FRAMES_HEARD = 1000
+FRAMES_KEPT = 1000
 READ_WITHIN = 0.1
 """Seconds within which monitoring ends after a request."""
 SUMMED_UP_EVERY = 1.0
@@ -29,7 +29,7 @@ SUMMED_UP_EVERY = 1.0
 log = logging.getLogger(__name__)
 
 
-class HeardLine:
+class BackgroundListener:
     """Monitored line, opened by `open`; every attribute may be read from any thread.
 
     `named` gives profiles by device, with None as the key for all others.
@@ -44,7 +44,7 @@ class HeardLine:
         self._over = threading.Event()
         self._stack = ExitStack()
         self._thread: threading.Thread | None = None
-        self._trace = Trace(FRAMES_HEARD)
+        self._trace = Trace(FRAMES_KEPT)
         self._summed: tuple[float, ListeningSummary] | None = None
         self.trouble = ""
         """Error that ended monitoring; empty while it runs or after `close`."""
@@ -57,7 +57,7 @@ class HeardLine:
             self._families = Families(
                 known_profiles(), self._named, remembered_families(place.line.link)
             )
-            self._hearing = Hearing(place.line, self._families, _forget, self._keep)
+            self._port_listener = PortListener(place.line, self._families, _forget, self._keep)
             place.begin()
             self._stack = opening.pop_all()
         self._thread = threading.Thread(target=self._listen, name="listening", daemon=True)
@@ -78,9 +78,9 @@ class HeardLine:
     def summary(self) -> ListeningSummary:
         """Return the summary; at most a second old."""
         with self._lock:
-            now = self._hearing.clock.monotonic()
+            now = self._port_listener.clock.monotonic()
             if self._summed is None or now - self._summed[0] > SUMMED_UP_EVERY:
-                self._summed = now, self._hearing.summary(now)
+                self._summed = now, self._port_listener.summary(now)
             return self._summed[1]
 
     def profile(self, device: int) -> Profile | None:
@@ -92,22 +92,22 @@ class HeardLine:
     def raws(self, device: int) -> Mapping[str, int]:
         """Return the last observed raw value of each parameter of a drive."""
         with self._lock:
-            tally = self._hearing.listener.tally.drives.get(device)
+            tally = self._port_listener.listener.tally.drives.get(device)
             return dict(tally.raws) if tally is not None else {}
 
     def _listen(self) -> None:
         try:
             while not self._over.is_set():
-                data, now = self._hearing.read(READ_WITHIN)
+                data, now = self._port_listener.read(READ_WITHIN)
                 with self._lock:
-                    self._hearing.take(data, now)
+                    self._port_listener.take(data, now)
         except LineError as error:
             self.trouble = str(error)
         except Exception as error:
             log.exception("listening to %s failed", self.text)
             self.trouble = f"Listening failed: {error}"
 
-    def _keep(self, frame: HeardFrame, request: bool | None) -> None:
+    def _keep(self, frame: ObservedFrame, request: bool | None) -> None:
         note = "noise" if request is None else ""
         self._trace.add(frame.ended, "out" if request else "in", frame.data, note)
 

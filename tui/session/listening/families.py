@@ -13,7 +13,7 @@ from typing import Literal
 from tui.bus.link import Link
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
-from tui.wire.heard.pairing import HeardExchange
+from tui.wire.observed.pairing import ObservedExchange
 
 from ..connect.identify import DriveIdentity, identity_from
 from ..connect.known_lines import line_name, load_memory
@@ -96,7 +96,7 @@ class Families:
             return AssumedProfile(self._known[remembered], "remembered")
         return self._inferred(device)
 
-    def note(self, exchange: HeardExchange) -> None:
+    def note(self, exchange: ObservedExchange) -> None:
         """Add the facts of an exchange."""
         if (objects := identity_objects(exchange)) is not None:
             reported = identity_from(exchange.device, objects)

@@ -6,12 +6,12 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from tui.drive.profile.profile import Profile
-from tui.wire.heard.pairing import HeardExchange, Pairing
-from tui.wire.heard.splitting import FrameSplitter, HeardFrame
+from tui.wire.observed.pairing import ObservedExchange, Pairing
+from tui.wire.observed.splitting import FrameSplitter, ObservedFrame
 
 from .families import AssumedProfile, Families
 from .tally import LineTally
-from .words import HeardValue, values_of
+from .words import ObservedValue, values_of
 
 SHORTEST_PAUSE = 0.05
 """Seconds without a byte that end a frame: an adapter may deliver the rest this much later."""
@@ -19,7 +19,7 @@ BESIDE_SILENCE = 0.02
 LONG_FOR_AN_ANSWER = 0.5
 """Seconds after which a request that is still open at the end counts as unanswered."""
 
-FrameHeard = Callable[[HeardFrame, bool | None], None]
+OnFrame = Callable[[ObservedFrame, bool | None], None]
 """Receives each frame; True for a request, False for a reply, None for bytes outside any frame."""
 
 
@@ -27,9 +27,9 @@ FrameHeard = Callable[[HeardFrame, bool | None], None]
 class DecodedExchange:
     """Exchange interpreted by its drive's family."""
 
-    exchange: HeardExchange
+    exchange: ObservedExchange
     family: AssumedProfile | None
-    values: tuple[HeardValue, ...]
+    values: tuple[ObservedValue, ...]
 
     @property
     def profile(self) -> Profile | None:
@@ -50,7 +50,7 @@ class LineListener:
         *,
         character: float = 0.0,
         silence: float = 0.0,
-        frame_heard: FrameHeard = lambda _frame, _request: None,
+        on_frame: OnFrame = lambda _frame, _request: None,
     ) -> None:
         self.families = families
         self.tally = LineTally(begun)
@@ -58,7 +58,7 @@ class LineListener:
         self.character = character
         self.pause = max(SHORTEST_PAUSE, silence + BESIDE_SILENCE)
         """Seconds without a byte after which `idle` must be called."""
-        self._heard = frame_heard
+        self._heard = on_frame
         self._pairing = Pairing()
         self._splitter = FrameSplitter(character, self._pairing.is_due)
 
@@ -79,7 +79,7 @@ class LineListener:
             self._tell(exchange) for exchange in self._pairing.wait(now, LONG_FOR_AN_ANSWER)
         ]
 
-    def _report(self, frames: Iterable[HeardFrame]) -> list[DecodedExchange]:
+    def _report(self, frames: Iterable[ObservedFrame]) -> list[DecodedExchange]:
         found = []
         for frame in frames:
             self.tally.take_frame(frame, self.silence if self.character else 0.0)
@@ -88,7 +88,7 @@ class LineListener:
             found += [self._tell(exchange) for exchange in exchanges]
         return found
 
-    def _tell(self, exchange: HeardExchange) -> DecodedExchange:
+    def _tell(self, exchange: ObservedExchange) -> DecodedExchange:
         self.families.note(exchange)
         family = self.families.family(exchange.device)
         profile = family.profile if family is not None else None

@@ -14,7 +14,7 @@ from ..connect.line_key import SIMULATED_PREFIX
 from ..connect.share_place import share_place, this_program
 
 
-class NothingToHear(LineError):
+class CannotListen(LineError):
     """The line cannot be monitored for other masters' traffic."""
 
 
@@ -30,7 +30,7 @@ class PlaceToListen:
 def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
     """Open the line of a text for monitoring, for a program of that name.
 
-    Raises NothingToHear unless it is a serial line, LinkSyntaxError, and the errors of
+    Raises CannotListen unless it is a serial line, LinkSyntaxError, and the errors of
     ListeningLine.
     """
     if text.casefold().startswith(SIMULATED_PREFIX):
@@ -39,7 +39,7 @@ def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
         return
     link = parse_link(text)
     if not isinstance(link, SerialLink):
-        raise NothingToHear(
+        raise CannotListen(
             f"{text} is not a serial port. Other masters cannot be monitored over a network. To see"
             " the traffic of a line that is open in Drive Panel, use the Frames screen."
         )

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 
 from tui.drive.profile.profile import Profile, group_holds
 from tui.drive.profile.schema import Parameter
-from tui.wire.heard.pairing import HeardExchange
-from tui.wire.heard.splitting import HeardFrame
+from tui.wire.observed.pairing import ObservedExchange
+from tui.wire.observed.splitting import ObservedFrame
 
-from .words import HeardValue, WordSpan, spans_of
+from .words import ObservedValue, WordSpan, spans_of
 
 CUT_BY = 0.002
 """Seconds by which a pause inside a frame must exceed t3.5 to count: bytes are read late."""
@@ -111,7 +111,7 @@ class DriveTally:
         return max(self.longest_pause, now - self.fed if self.fed is not None else 0.0)
 
     def take(
-        self, exchange: HeardExchange, values: Sequence[HeardValue], profile: Profile | None
+        self, exchange: ObservedExchange, values: Sequence[ObservedValue], profile: Profile | None
     ) -> None:
         """Count an exchange of this drive with its values."""
         self.answers[exchange.answer] += 1
@@ -132,7 +132,7 @@ class DriveTally:
         for value in values:
             self._take_value(value, exchange.time, profile)
 
-    def _take_reads(self, exchange: HeardExchange) -> None:
+    def _take_reads(self, exchange: ObservedExchange) -> None:
         for span in spans_of(exchange.request):
             if span.written or (span not in self.reads and len(self.reads) >= READS_KEPT):
                 continue
@@ -140,7 +140,7 @@ class DriveTally:
             read.times += 1
             read.last = exchange.time
 
-    def _take_value(self, value: HeardValue, time: float, profile: Profile | None) -> None:
+    def _take_value(self, value: ObservedValue, time: float, profile: Profile | None) -> None:
         if value.parameter is not None:
             self.raws[value.code] = value.raw
         if not value.written:
@@ -187,7 +187,7 @@ class LineTally:
     """Requests that began while another awaited its reply."""
     drives: dict[int, DriveTally] = field(default_factory=dict)
 
-    def take_frame(self, frame: HeardFrame, silence: float) -> None:
+    def take_frame(self, frame: ObservedFrame, silence: float) -> None:
         """Count a frame, or noise; `silence` is the required pause between two frames in seconds,
         or 0."""
         self.bytes += len(frame.data)
@@ -204,7 +204,7 @@ class LineTally:
         elif frame.pause < silence * TOO_SOON:
             self.hasty += 1
 
-    def take_exchange(self, exchange: HeardExchange) -> None:
+    def take_exchange(self, exchange: ObservedExchange) -> None:
         """Count an exchange."""
         self.exchanges += 1
         if exchange.waited is not None and exchange.waited < NOBODY_WAITS_SO_SHORT:

@@ -8,7 +8,7 @@ from tui.drive.sentences import first_of
 from .families import Families
 from .listener import DecodedExchange
 from .summary import exception_meaning
-from .words import FUNCTION_NAMES, WHO, HeardValue, names_of_words, spans_of
+from .words import FUNCTION_NAMES, WHO, ObservedValue, names_of_words, spans_of
 
 CODES_NAMED_AT_MOST = 4
 """Number of parameters of a request that are named if it returned no values."""
@@ -56,7 +56,7 @@ def _trouble(reported: DecodedExchange) -> str:
     return "damaged answer" if exchange.answer == "damaged" else "no answer"
 
 
-def _value_text(value: HeardValue) -> str:
+def _value_text(value: ObservedValue) -> str:
     arrow = "← " if value.written else ""
     return f"{value.code} {arrow}{value.value.display}"
 

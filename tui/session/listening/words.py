@@ -11,7 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.shown import shown
 from tui.drive.values import Value, from_words, word_count
-from tui.wire.heard.pairing import HeardExchange
+from tui.wire.observed.pairing import ObservedExchange
 
 HOLDING, INPUT = 3, 4
 WRITE_WORD, WRITE_WORDS, READ_AND_WRITE, WHO = 6, 16, 23, 43
@@ -47,7 +47,7 @@ class WordSpan:
 
 
 @dataclass(frozen=True, slots=True)
-class HeardValue:
+class ObservedValue:
     """One parameter, or a word that no profile names, with its value."""
 
     code: str
@@ -84,7 +84,7 @@ def _spans(request: bytes) -> Iterator[WordSpan]:
         yield WordSpan(HOLDING, address, count)
 
 
-def words_read(exchange: HeardExchange) -> tuple[int, ...]:
+def words_read(exchange: ObservedExchange) -> tuple[int, ...]:
     """Return the words of a good read reply; empty for any other exchange."""
     if exchange.answer != "ok" or exchange.function not in (HOLDING, INPUT, READ_AND_WRITE):
         return ()
@@ -93,15 +93,15 @@ def words_read(exchange: HeardExchange) -> tuple[int, ...]:
 
 
 def values_of(
-    exchange: HeardExchange, profile: Profile | None, raws: Mapping[str, int]
-) -> list[HeardValue]:
+    exchange: ObservedExchange, profile: Profile | None, raws: Mapping[str, int]
+) -> list[ObservedValue]:
     """Return the values that a request wrote and its reply contains; `raws` are raw values by code.
 
     Refused values do not count, nor do those that a drive did not confirm, except of a broadcast.
     """
     if exchange.answer not in ("ok", "broadcast"):
         return []
-    found: list[HeardValue] = []
+    found: list[ObservedValue] = []
     read = words_read(exchange)
     for span in spans_of(exchange.request):
         words = span.written or read
@@ -117,16 +117,16 @@ def names_of_words(span: WordSpan, profile: Profile | None) -> list[str]:
 
 def _cut(
     span: WordSpan, words: Sequence[int], profile: Profile | None, raws: Mapping[str, int]
-) -> Iterator[HeardValue]:
+) -> Iterator[ObservedValue]:
     for code, at, parameter, wide in _parts(span, profile):
         word, address, written = words[at], span.address + at, bool(span.written)
         if parameter is None or profile is None or at + wide > span.count:
             value = Value(word, None, "", f"16#{word:04X}")
-            yield HeardValue(code, address, word, value, written, parameter)
+            yield ObservedValue(code, address, word, value, written, parameter)
             continue
         raw = from_words(parameter, list(words[at : at + wide]))
         value = shown(profile, parameter, raw, raws)
-        yield HeardValue(code, address, raw, value, written, parameter)
+        yield ObservedValue(code, address, raw, value, written, parameter)
 
 
 def _parts(
@@ -142,7 +142,7 @@ def _parts(
         at += wide
 
 
-def identity_objects(exchange: HeardExchange) -> IdentificationObjects | None:
+def identity_objects(exchange: ObservedExchange) -> IdentificationObjects | None:
     """Return the identity in an exchange of function 43; None if there is none."""
     if exchange.answer != "ok" or exchange.function != WHO or len(exchange.reply) < _OBJECTS_FROM:
         return None

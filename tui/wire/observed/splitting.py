@@ -19,7 +19,7 @@ SILENT_BEFORE = 0.001
 
 
 @dataclass(frozen=True, slots=True)
-class HeardFrame:
+class ObservedFrame:
     """A frame, or bytes outside any frame; times are those of the listener's clock, in seconds."""
 
     begun: float
@@ -96,7 +96,7 @@ class FrameSplitter:
         """True if there are bytes that do not form a frame yet."""
         return bool(self._data)
 
-    def take(self, data: bytes, time: float) -> Iterator[HeardFrame]:
+    def take(self, data: bytes, time: float) -> Iterator[ObservedFrame]:
         """Take bytes that were read at a time; yield the frames that are now complete."""
         self._complete = False
         if data:
@@ -107,11 +107,11 @@ class FrameSplitter:
             self._ended = time
         yield from self._frames(final=False)
 
-    def pause(self) -> Iterator[HeardFrame]:
+    def pause(self) -> Iterator[ObservedFrame]:
         """Yield all remaining bytes after a long silence: no frame continues."""
         return self._frames(final=True)
 
-    def _frames(self, *, final: bool) -> Iterator[HeardFrame]:
+    def _frames(self, *, final: bool) -> Iterator[ObservedFrame]:
         while self._data:
             whole, length = self._last() if final else self._next()
             if not length:
@@ -168,7 +168,7 @@ class FrameSplitter:
             at += chunk.length
         return False
 
-    def _cut(self, length: int, *, whole: bool) -> HeardFrame:
+    def _cut(self, length: int, *, whole: bool) -> ObservedFrame:
         """Remove this number of bytes from the beginning, and return them as a frame."""
         data = bytes(self._data[:length])
         del self._data[:length]
@@ -186,4 +186,4 @@ class FrameSplitter:
             if not chunk.length:
                 self._chunks.pop(0)
         self._given = ended
-        return HeardFrame(begun, ended, data, whole, pause, gap)
+        return ObservedFrame(begun, ended, data, whole, pause, gap)

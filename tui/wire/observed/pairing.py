@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .lengths import REFUSAL, SAME_BOTH_WAYS, fits_reply, fits_request
-from .splitting import HeardFrame
+from .splitting import ObservedFrame
 
-HeardAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
+ObservedAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
 """Result of a request: `again` is a second reply, `unasked` a reply without a request."""
 BROADCAST_DEVICE = 0
 GIVEN_UP_AFTER = 3.0
@@ -26,7 +26,7 @@ _ECHOED = {15: 5, 16: 5}
 
 
 @dataclass(frozen=True, slots=True)
-class HeardExchange:
+class ObservedExchange:
     """A request with its result; requests and replies without device and checksum."""
 
     time: float
@@ -34,7 +34,7 @@ class HeardExchange:
     clock."""
     device: int
     function: int
-    answer: HeardAnswer
+    answer: ObservedAnswer
     request: bytes = b""
     reply: bytes = b""
     turnaround: float | None = None
@@ -52,7 +52,7 @@ class HeardExchange:
 
 @dataclass(slots=True)
 class _OpenRequest:
-    frame: HeardFrame
+    frame: ObservedFrame
     noise: bytes = b""
 
 
@@ -61,7 +61,7 @@ class Pairing:
 
     def __init__(self) -> None:
         self._requested: _OpenRequest | None = None
-        self._last: HeardExchange | None = None
+        self._last: ObservedExchange | None = None
         self._replied = float("-inf")
         """Time of the end of the last reply."""
         self._reply = b""
@@ -75,7 +75,7 @@ class Pairing:
             function,
         )
 
-    def take(self, frame: HeardFrame) -> tuple[list[HeardExchange], bool | None]:
+    def take(self, frame: ObservedFrame) -> tuple[list[ObservedExchange], bool | None]:
         """Take a frame; return the exchanges that are now known, and True if it is a request.
 
         The second value is None for noise.
@@ -95,18 +95,18 @@ class Pairing:
         self._requested = _OpenRequest(frame)
         return found, True
 
-    def wait(self, now: float, longest: float = GIVEN_UP_AFTER) -> list[HeardExchange]:
+    def wait(self, now: float, longest: float = GIVEN_UP_AFTER) -> list[ObservedExchange]:
         """Return the open request as unanswered if it has waited for `longest` seconds."""
         if self._requested is None or now - self._requested.frame.ended < longest:
             return []
         return self._given_up()
 
-    def _answered(self, requested: _OpenRequest, frame: HeardFrame) -> HeardExchange:
+    def _answered(self, requested: _OpenRequest, frame: ObservedFrame) -> ObservedExchange:
         self._requested = None
         self._replied, self._reply = frame.ended, frame.data
         refused = bool(frame.function & REFUSAL)
         return self._kept(
-            HeardExchange(
+            ObservedExchange(
                 requested.frame.begun,
                 frame.device,
                 requested.frame.function,
@@ -118,7 +118,7 @@ class Pairing:
             )
         )
 
-    def _given_up(self, following: HeardFrame | None = None) -> list[HeardExchange]:
+    def _given_up(self, following: ObservedFrame | None = None) -> list[ObservedExchange]:
         """Return the open request as unanswered; `following` is the next request."""
         requested, self._requested = self._requested, None
         if requested is None:
@@ -127,41 +127,41 @@ class Pairing:
         # a second drive at the same address answers a moment later
         if frame.data == self._reply and frame.begun - self._replied < AGAIN_WITHIN:
             return [self._again(frame)]
-        answer: HeardAnswer = "damaged" if requested.noise else "none"
+        answer: ObservedAnswer = "damaged" if requested.noise else "none"
         waited = max(0.0, following.begun - frame.ended) if following is not None else None
         return [self._kept(_exchange(frame, answer, requested.noise, waited))]
 
-    def _stray(self, frame: HeardFrame) -> HeardExchange:
+    def _stray(self, frame: ObservedFrame) -> ObservedExchange:
         """Return a reply without a request."""
         last = self._last
         same = last is not None and last.answer in ("ok", "exception", "again")
         function = frame.function & ~REFUSAL
         if same and last is not None and (last.device, last.function) == (frame.device, function):
             return self._again(frame)
-        return HeardExchange(frame.begun, frame.device, function, "unasked", b"", frame.pdu)
+        return ObservedExchange(frame.begun, frame.device, function, "unasked", b"", frame.pdu)
 
-    def _again(self, frame: HeardFrame) -> HeardExchange:
+    def _again(self, frame: ObservedFrame) -> ObservedExchange:
         last = self._last
         assert last is not None
-        return HeardExchange(
+        return ObservedExchange(
             frame.begun, frame.device, last.function, "again", last.request, frame.pdu
         )
 
-    def _kept(self, exchange: HeardExchange) -> HeardExchange:
+    def _kept(self, exchange: ObservedExchange) -> ObservedExchange:
         self._last = exchange
         return exchange
 
 
 def _exchange(
-    frame: HeardFrame, answer: HeardAnswer, noise: bytes = b"", waited: float | None = None
-) -> HeardExchange:
+    frame: ObservedFrame, answer: ObservedAnswer, noise: bytes = b"", waited: float | None = None
+) -> ObservedExchange:
     """Return an exchange without a reply."""
-    return HeardExchange(
+    return ObservedExchange(
         frame.begun, frame.device, frame.function, answer, frame.pdu, noise=noise, waited=waited
     )
 
 
-def _answers(requested: HeardFrame, frame: HeardFrame) -> bool:
+def _answers(requested: ObservedFrame, frame: ObservedFrame) -> bool:
     """Return True if a frame is the reply to a request, including exceptions."""
     if frame.device != requested.device or frame.function & ~REFUSAL != requested.function:
         return False
@@ -179,6 +179,6 @@ def _answers(requested: HeardFrame, frame: HeardFrame) -> bool:
     return not _repeated(requested, frame)
 
 
-def _repeated(requested: HeardFrame, frame: HeardFrame) -> bool:
+def _repeated(requested: ObservedFrame, frame: ObservedFrame) -> bool:
     """Return True if a master has repeated an unanswered request."""
     return frame.data == requested.data and frame.begun - requested.ended > REPLY_WITHIN

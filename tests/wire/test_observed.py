@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from tests.simulator.manual import FRAMES, Frame
 from tui.wire.frames import frame, is_whole, read_frame, read_write_frame, write_frame
-from tui.wire.heard.lengths import whole_length
-from tui.wire.heard.pairing import HeardExchange, Pairing
-from tui.wire.heard.splitting import FrameSplitter, HeardFrame
+from tui.wire.observed.lengths import whole_length
+from tui.wire.observed.pairing import ObservedExchange, Pairing
+from tui.wire.observed.splitting import FrameSplitter, ObservedFrame
 
 CHARACTER = 11 / 19200
 WORD = st.integers(0, 0xFFFF)
@@ -31,7 +31,7 @@ def write_one(device: int, address: int, word: int) -> bytes:
     return frame(device, b"\x06" + address.to_bytes(2, "big") + word.to_bytes(2, "big"))
 
 
-def split(*readings: bytes, every: float = 0.01, pause: bool = True) -> list[HeardFrame]:
+def split(*readings: bytes, every: float = 0.01, pause: bool = True) -> list[ObservedFrame]:
     """Frames of readings that come at an even pace."""
     pairing = Pairing()
     splitter = FrameSplitter(CHARACTER, pairing.is_due)
@@ -43,7 +43,7 @@ def split(*readings: bytes, every: float = 0.01, pause: bool = True) -> list[Hea
     return found + (list(splitter.pause()) if pause else [])
 
 
-def heard(*readings: bytes, every: float = 0.01, until: float = 10.0) -> list[HeardExchange]:
+def heard(*readings: bytes, every: float = 0.01, until: float = 10.0) -> list[ObservedExchange]:
     """Exchanges of readings that come at an even pace, and then nothing."""
     pairing = Pairing()
     found = []
@@ -230,7 +230,7 @@ def test_cost_of_noise_does_not_grow(monkeypatch: pytest.MonkeyPatch) -> None:
         looked.append(len(data))
         return whole_length(data)
 
-    monkeypatch.setattr("tui.wire.heard.splitting.whole_length", counted)
+    monkeypatch.setattr("tui.wire.observed.splitting.whole_length", counted)
     splitter, chance, noise = FrameSplitter(CHARACTER), random.Random(1), 2000
     for number in range(noise):
         list(splitter.take(chance.randbytes(1), number * CHARACTER))

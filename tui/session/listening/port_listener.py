@@ -10,13 +10,13 @@ from tui.drive.read_plan import WireTiming
 
 from ..clock import REAL_CLOCK, Clock
 from .families import Families
-from .listener import DecodedExchange, FrameHeard, LineListener
+from .listener import DecodedExchange, LineListener, OnFrame
 from .summary import ListeningSummary, summary_of
 
 OnExchange = Callable[[DecodedExchange], None]
 
 
-class Hearing:
+class PortListener:
     """Monitored line; times are those of its clock."""
 
     def __init__(
@@ -24,7 +24,7 @@ class Hearing:
         line: ListeningLine,
         families: Families,
         reported: OnExchange,
-        frame_heard: FrameHeard = lambda _frame, _request: None,
+        on_frame: OnFrame = lambda _frame, _request: None,
         clock: Clock = REAL_CLOCK,
     ) -> None:
         self.clock = clock
@@ -35,7 +35,7 @@ class Hearing:
             self.clock.monotonic(),
             character=line.character,
             silence=line.silence,
-            frame_heard=frame_heard,
+            on_frame=on_frame,
         )
 
     def read(self, wait: float) -> tuple[bytes, float]:
