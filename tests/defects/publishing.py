@@ -28,7 +28,7 @@ DEFECTS = (
     Defect(
         "plant-asks-though-held-back",
         "tui/session/monitor/monitor.py",
-        "if why := self.held_back():",
+        "if why := self.pause_reason():",
         'if why := "":',
         "A monitor polls a drive whose polling is paused.",
         ("tests/session/test_monitor_faults.py",),

@@ -8,7 +8,7 @@ import pytest
 
 from tui.drive.channel import channel_codes, command_channel, reference_channel, switch_texts
 from tui.drive.chart import read_chart
-from tui.drive.command_blocked import held_back
+from tui.drive.command_blocked import blocked_reason
 from tui.drive.orders import chart_in_force
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
@@ -67,7 +67,7 @@ SMALL = ["atv31", "atv312"]
 def held(profile: Profile, raws: dict[str, int]) -> str:
     chart = chart_in_force(profile, raws)
     assert chart is not None
-    found = held_back(profile, chart, "forward", raws)
+    found = blocked_reason(profile, chart, "forward", raws)
     return found.text if found else ""
 
 

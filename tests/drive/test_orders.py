@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tui.drive.command_blocked import held_back
+from tui.drive.command_blocked import blocked_reason
 from tui.drive.orders import MOVING_ORDERS, STOP_ORDERS
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
@@ -23,7 +23,7 @@ def interlocks(family: str) -> Iterator[tuple[Chart, Interlock]]:
 
 
 def refusal(profile: Profile, chart: Chart, id: OrderId, raws: dict[str, int]) -> str:
-    held = held_back(profile, chart, id, raws)
+    held = blocked_reason(profile, chart, id, raws)
     return held.text if held is not None else ""
 
 

@@ -46,7 +46,7 @@ class Bench:
         """Return True if the drive is polled some seconds later; it answers then."""
         self.time += after
         self.session.timeout = self.timeout
-        why = self.looks_on.held_back()
+        why = self.looks_on.pause_reason()
         assert why in ("", COMMANDER_SILENT)
         assert self.looks_on.waits == bool(why)
         if not why:

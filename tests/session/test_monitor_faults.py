@@ -249,11 +249,11 @@ def test_unreadable_values_are_not_retried_forever() -> None:
 
 async def test_paused_drive_is_not_polled_and_has_a_reason(bench: Bench) -> None:
     await bench.run(2)
-    bench.monitor.held_back = lambda: "Left alone."
+    bench.monitor.pause_reason = lambda: "Left alone."
     reported = await bench.run(FORGOTTEN_AFTER + 2)
     assert [requested for _, requested in reported[1:]] == [[]] * (len(reported) - 1)
     assert reported[-1][0].error == "Left alone."
-    bench.monitor.held_back = lambda: ""
+    bench.monitor.pause_reason = lambda: ""
     assert not (await bench.run(3))[-1][0].error
 
 

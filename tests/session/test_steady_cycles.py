@@ -278,7 +278,7 @@ async def test_drive_paused_at_times_is_read_directly(steady: Steady) -> None:
     assert steady.holder.plans == []
     steady.monitor.freely = lambda: True
     await steady.until(lambda: steady.holder.polls)
-    steady.monitor.held_back = lambda: "left alone"
+    steady.monitor.pause_reason = lambda: "left alone"
     snapshot = await steady.cycle()
     assert (snapshot.error, snapshot.contact) == ("left alone", "not_polled")
     assert not steady.holder.polls

@@ -30,7 +30,7 @@ class CommandBlocked:
     """True if the reason is that another source commands the drive, or may command it."""
 
 
-def held_back(
+def blocked_reason(
     profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]
 ) -> CommandBlocked | None:
     """Return why a command would have no effect; None if it would.

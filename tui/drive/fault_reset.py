@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Literal
 
 from .channel import command_channel
-from .command_blocked import held_back
+from .command_blocked import blocked_reason
 from .orders import chart_in_force, deciding_codes, follows_from
 from .profile.profile import Profile
 from .profile.schema import Chart, StateKind
@@ -52,7 +52,7 @@ def not_in_command(profile: Profile, raws: Mapping[str, int]) -> str:
     if command_holder(profile, raws) != "others":
         return ""
     chart = chart_in_force(profile, raws)
-    held = held_back(profile, chart, "forward", raws) if chart is not None else None
+    held = blocked_reason(profile, chart, "forward", raws) if chart is not None else None
     why = (held.text, held.remedy) if held is not None and held.by_channel else ()
     return " ".join(
         part for part in (f"{NOT_IN_COMMAND}, and the drive is still in fault.", *why) if part
@@ -65,7 +65,7 @@ def command_holder(profile: Profile, raws: Mapping[str, int]) -> Literal["line",
     if found is not None:
         return None if found.by_line is None else "line" if found.by_line else "others"
     chart = chart_in_force(profile, raws)
-    held = held_back(profile, chart, "forward", raws) if chart is not None else None
+    held = blocked_reason(profile, chart, "forward", raws) if chart is not None else None
     return "others" if held is not None and held.by_channel else None
 
 

@@ -231,7 +231,7 @@ class PlantDrive:
         monitor = Monitor(session)
         looks_on = ObserverPoller(session, partial(self._sign, self.device), lambda: monitor.latest)
         looks_on.orphan = await asyncio.to_thread(_is_orphan, session)
-        monitor.held_back, monitor.freely = looks_on.held_back, looks_on.freely
+        monitor.pause_reason, monitor.freely = looks_on.pause_reason, looks_on.freely
         leave = monitor.listen(partial(self._take, Cycles(session, codes), loop))
         self._good, learned = loop.time(), loop.time()
         monitor.start(codes, self._every)
@@ -243,7 +243,7 @@ class PlantDrive:
                 if self.cycle is not None and not self.cycle.error:
                     self._good = loop.time()
                     due = loop.time() - learned > TIMEOUT_READ_AGAIN
-                    if due and not looks_on.held_back():
+                    if due and not looks_on.pause_reason():
                         learned = loop.time()
                         await _learn_timeout(session)
                 elif self.cycle is not None and looks_on.waits:

@@ -202,7 +202,7 @@ def _channels(
 
 
 def _refused(session: DriveSession) -> str:
-    from tui.drive.command_blocked import held_back, state_refusal
+    from tui.drive.command_blocked import blocked_reason, state_refusal
     from tui.drive.orders import chart_in_force
     from tui.session.command.unblock_hint import block_reason_text
 
@@ -214,7 +214,7 @@ def _refused(session: DriveSession) -> str:
         return f"Drive Panel does not command this drive: {chart.name}."
     if session.line.read_only:
         return "The line is read-only: nothing is written."
-    held = held_back(session.profile, chart, "forward", raws)
+    held = blocked_reason(session.profile, chart, "forward", raws)
     if held is not None:
         return block_reason_text(held)
     return state_refusal(session.profile, chart, "forward", raws)

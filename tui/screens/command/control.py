@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tui.drive.command_blocked import held_back
+from tui.drive.command_blocked import blocked_reason
 from tui.drive.orders import chart_in_force
 from tui.drive.profile.profile import Profile
 from tui.session.command.unblock_hint import way_by_key
@@ -54,5 +54,5 @@ UNARMED = Control()
 def hindrance(profile: Profile, raws: Mapping[str, int]) -> Hindrance | None:
     """Return the reason against a run command now, as far as known."""
     chart = chart_in_force(profile, raws)
-    held = held_back(profile, chart, "forward", raws) if chart is not None else None
+    held = blocked_reason(profile, chart, "forward", raws) if chart is not None else None
     return Hindrance(held.text, way_by_key(held), held.by_channel) if held else None

@@ -15,7 +15,7 @@ from tui.bus.errors import DeviceException, LineError, RequestRefused
 from tui.drive.blocks.assignment import UNUSED, Assignment, describe, slot_target
 from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.blocks.wire_cost import reach, span
-from tui.drive.command_blocked import held_back
+from tui.drive.command_blocked import blocked_reason
 from tui.drive.orders import chart_in_force, deciding_codes, interlock_codes
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import AT_REST, is_order
@@ -315,7 +315,7 @@ class ExchangeChecks:
         found = chart_in_force(profile, raws)
         if found is None or not found.orders:
             raise AssignmentRefused("Nothing was written: Drive Panel does not command this drive.")
-        if (held := held_back(profile, found, "forward", raws)) is not None:
+        if (held := blocked_reason(profile, found, "forward", raws)) is not None:
             raise AssignmentRefused(f"{held.text} {held.remedy}".strip())
 
     def check_values(self, raws: Mapping[str, int]) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tui.bus.api import Priority
 from tui.drive.chart import state_codes, state_now
-from tui.drive.command_blocked import held_back
+from tui.drive.command_blocked import blocked_reason
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
@@ -74,7 +74,11 @@ class CommandAccess(Writer):
             if found is None:
                 raise OrderRefused(NO_CHART)
             raise OrderRefused(f"Drive Panel does not command this drive: {found.name}.")
-        held = held_back(session.profile, found, wanted, self.raws) if wanted is not None else None
+        held = (
+            blocked_reason(session.profile, found, wanted, self.raws)
+            if wanted is not None
+            else None
+        )
         if held is not None:
             raise OrderRefused(block_reason_text(held))
         return found

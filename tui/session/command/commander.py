@@ -15,7 +15,7 @@ from typing import Any
 from tui.bus.api import Priority
 from tui.drive.channel import channel_codes
 from tui.drive.chart import ENABLED_KINDS, state_of
-from tui.drive.command_blocked import held_back, state_refusal
+from tui.drive.command_blocked import blocked_reason, state_refusal
 from tui.drive.control_source import source_changes, source_codes
 from tui.drive.fault_reset import no_fault, not_in_command
 from tui.drive.orders import (
@@ -256,7 +256,7 @@ async def check_run(access: CommandAccess, id: OrderId, reference: str | None) -
     raws = {**access.raws, **taken}
     if (then := chart_in_force(profile, raws)) is None:
         then = chart
-    if (held := held_back(profile, then, id, raws)) is not None:
+    if (held := blocked_reason(profile, then, id, raws)) is not None:
         raise OrderRefused(block_reason_text(held))
     if refusal := state_refusal(profile, then, id, raws):
         raise OrderRefused(refusal)

@@ -60,13 +60,13 @@ class Monitor:
         self.profile = session.profile
         self.period = 0.5
         """Target cycle time in seconds; a change applies from the next cycle on."""
-        self.held_back: Callable[[], str] = lambda: ""
+        self.pause_reason: Callable[[], str] = lambda: ""
         """Returns why the drive must not be polled now; empty to poll it.
 
         Called before each cycle, in the line's thread.
         """
         self.freely: Callable[[], bool] = lambda: True
-        """Returns True if the keeper may read cycles without a call of `held_back` for each."""
+        """Returns True if the keeper may read cycles without a call of `pause_reason` for each."""
         self.reader = Reader(session)
         self._steady = SteadyCycles(session, self.reader)
         self.restarts = 0
@@ -192,7 +192,7 @@ class Monitor:
                     self._all_due, self._learn_due = False, True
                     due.add(rates.seldom)
                 try:
-                    if why := self.held_back():
+                    if why := self.pause_reason():
                         raise PollHeldBack(why)
                     seldom = (*rates.seldom, *self.session.followed)
                     turn = self._steady.turn(due, seldom)

@@ -56,7 +56,7 @@ class ObserverPoller:
         """Return True if it may be polled at any time: no program has started its motor."""
         return self._sign() is None and not self.orphan
 
-    def held_back(self) -> str:
+    def pause_reason(self) -> str:
         """Return why the drive must not be polled now; if empty, it counts as polled."""
         self.waits = not self._may_ask()
         if self.waits:
