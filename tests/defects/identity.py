@@ -8,7 +8,7 @@ CONTRADICTION = "tests/session/test_contradiction.py"
 FIRST = "tests/drive/test_first_stop.py"
 TIMEOUT = "tests/session/test_timeout.py"
 IDENTITY = "tests/cli/test_identity.py"
-LEFT = "tests/cli/test_left_alone.py"
+LEFT = "tests/cli/test_pending_timeouts.py"
 
 BYTES = "tests/session/test_byte_order.py"
 

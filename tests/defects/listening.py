@@ -115,8 +115,8 @@ DEFECTS = (
     Defect(
         "fed-drive-left-for-listening",
         "tui/screens/hear.py",
-        "if acting := watch.left_alone():",
-        "if (acting := watch.left_alone()) and False:",
+        "if acting := watch.pending_timeouts():",
+        "if (acting := watch.pending_timeouts()) and False:",
         "A drive trips because a person listened to the line.",
         (f"{HEARING}::test_drive_kept_alive_by_the_panel_blocks_monitoring",),
     ),

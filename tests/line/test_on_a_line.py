@@ -197,17 +197,17 @@ async def test_monitored_drive_uses_its_monitor_for_the_timeout() -> None:
     line_watch = LineWatch(opened.line)
     line_watch.keep(drive, monitor)
 
-    def left_alone() -> dict[int, float]:
-        return {device: watch.timeout for device, watch in line_watch.left_alone().items()}
+    def pending_timeouts() -> dict[int, float]:
+        return {device: watch.timeout for device, watch in line_watch.pending_timeouts().items()}
 
     try:
-        await until(lambda: left_alone() == {1: 3.0} and line_watch.runs(1))
+        await until(lambda: pending_timeouts() == {1: 3.0} and line_watch.runs(1))
         assert line_watch.looks == {}, "the monitor's states counted"
         assert opened.simulation is not None
         opened.simulation.drive(1).halt()
         await until(lambda: not line_watch.runs(1))
         # it trips at rest, too
-        assert left_alone() == {1: 3.0}
+        assert pending_timeouts() == {1: 3.0}
     finally:
         line_watch.stop()
         opened.close()
@@ -281,7 +281,7 @@ async def test_timeout_that_starts_with_a_command_is_not_reported_before() -> No
         watch = line_watch.watch(1)
         assert watch is not None
         assert (watch.timeout, watch.active) == (10.0, False)
-        assert line_watch.left_alone() == {}
+        assert line_watch.pending_timeouts() == {}
     finally:
         line_watch.stop()
         opened.close()

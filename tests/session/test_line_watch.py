@@ -144,7 +144,7 @@ async def test_drive_without_a_timeout_is_neither_kept_alive_nor_reported(
     kept.line.heard = time.monotonic() - 1000
     assert kept.watch.watch(1) is None
     assert kept.watch.warnings() == []
-    assert kept.watch.left_alone() == {}
+    assert kept.watch.pending_timeouts() == {}
     await until(lambda: kept_alive(kept.line) == [])
 
 

@@ -296,7 +296,7 @@ async def test_resting_drives_that_will_trip_are_known() -> None:
     """An Altivar 21 watches the line from the first request on, at rest too."""
     async with bench("atv21") as here:
         await until(lambda: here.fleet.line_watch.watch(1) is not None)
-        alone = here.fleet.line_watch.left_alone()
+        alone = here.fleet.line_watch.pending_timeouts()
         assert alone[1].timeout == 3.0
         assert here.fleet.line_watch.under_command() == []
 
@@ -306,12 +306,12 @@ async def test_motor_commanded_by_the_line_is_watched_whatever_started_it() -> N
     async with bench("atv71", watch=False) as here:
         line_watch = here.fleet.line_watch
         await until(lambda: line_watch.watch(1) is not None)
-        assert line_watch.left_alone() == {}
+        assert line_watch.pending_timeouts() == {}
         for address, word in ((8502, 200), (8501, 6), (8501, 7), (8501, 15)):
             await here.line.write(1, address, [word])
         await until(lambda: line_watch.runs(1))
         assert not here.session.commanded
-        assert 1 in line_watch.left_alone()
+        assert 1 in line_watch.pending_timeouts()
 
 
 async def test_arming_by_a_command_does_not_expire() -> None:

@@ -11,7 +11,7 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.drive.profile import library
 from tui.session.clock import REAL_CLOCK, Clock
 from tui.session.drive import DriveSession
-from tui.session.monitor.timeout import has_begun, left_alone_text, read_timeout, timeout_now
+from tui.session.monitor.timeout import has_begun, polling_stop_text, read_timeout, timeout_now
 from tui.session.read.presence import presence_read
 from tui.session.read.reader import ASK_AGAIN, Reader
 from tui.session.timeout_report import Timeout
@@ -98,7 +98,7 @@ async def test_timeout_without_a_reaction_has_not_begun() -> None:
     for found in (session.timeout, timeout_now(session)):
         assert found.watch is not None
         assert (found.watch.active, found.watch.acts) == (False, False)
-    text = left_alone_text(session, watch=session.timeout.watch)
+    text = polling_stop_text(session, watch=session.timeout.watch)
     assert "goes on: its reaction is Ignored" in text
     assert "acts" not in text
 

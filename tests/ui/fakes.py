@@ -246,7 +246,7 @@ class FakeLineWatch:
         """Every timeout is known."""
         return []
 
-    def left_alone(self) -> dict[int, TimeoutWatch]:
+    def pending_timeouts(self) -> dict[int, TimeoutWatch]:
         """The drives that trip."""
         return self.alone
 

@@ -200,7 +200,7 @@ async def test_percentage_becomes_amperes_once_the_rating_is_known() -> None:
 
 def alone(line_watch: LineWatch) -> dict[int, float]:
     """Seconds after which drives react once polling stops, by device."""
-    return {device: watch.timeout for device, watch in line_watch.left_alone().items()}
+    return {device: watch.timeout for device, watch in line_watch.pending_timeouts().items()}
 
 
 async def test_leaving_a_drive_with_a_timeout_asks_first() -> None:

@@ -214,7 +214,7 @@ class Watch:
     def under_command(self) -> list[Any]:
         return self.commanded
 
-    def left_alone(self) -> dict[int, Any]:
+    def pending_timeouts(self) -> dict[int, Any]:
         return self.acting
 
     def unread(self) -> list[Any]:

@@ -129,7 +129,7 @@ async def test_drive_with_its_timeout_reaction_off_has_no_pending_timeout() -> N
         (text,) = (text for text in output(app) if "Kept asking" in text)
         assert "Kept asking: 2 (3 s). Otherwise they trip" in text
         assert app.fleet is not None
-        assert set(app.fleet.line_watch.left_alone()) <= {2}
+        assert set(app.fleet.line_watch.pending_timeouts()) <= {2}
 
 
 async def test_drive_with_damaged_identification_keeps_its_stop_keys() -> None:

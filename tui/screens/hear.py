@@ -28,7 +28,7 @@ CLOSE_FIRST = "To stop polling it anyway, close the line first: Ctrl+P, close."
 
 def why_not_hear(fleet: Fleet) -> str:
     """Why the panel may not fall silent on a line, in a sentence; empty where it may."""
-    from tui.session.monitor.timeout import left_alone_text, names_of
+    from tui.session.monitor.timeout import names_of, polling_stop_text
 
     line, watch = fleet.line, fleet.line_watch
     if not isinstance(line.link, SerialLink):
@@ -39,9 +39,9 @@ def why_not_hear(fleet: Fleet) -> str:
     if running := watch.under_command():
         who = "; ".join(names_of([session]) for session in running)
         return f"Not monitored: {who} runs by a command of this panel. Stop it first."
-    if acting := watch.left_alone():
+    if acting := watch.pending_timeouts():
         reported = next(session for session in fleet.sessions if session.device in acting)
-        text = left_alone_text(reported, watch=acting[reported.device])
+        text = polling_stop_text(reported, watch=acting[reported.device])
         return f"Not listened to, as the panel feeds drives. {text} {CLOSE_FIRST}"
     if unread := watch.unread():
         who = names_of([unread[0]])

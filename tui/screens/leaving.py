@@ -74,12 +74,14 @@ class Leaving(Panel):
         self, fleet: Fleet, sessions: list[DriveSession], *, on_purpose: bool
     ) -> list[str]:
         """Which motors run, what each drive does left alone, and what others on its line do."""
-        from tui.session.monitor.timeout import left_alone_text
+        from tui.session.monitor.timeout import polling_stop_text
         from tui.session.sharing.handover import peer_effect_text
 
         reported = []
         for session in sessions:
-            reported.append(left_alone_text(session, watch=fleet.line_watch.watch(session.device)))
+            reported.append(
+                polling_stop_text(session, watch=fleet.line_watch.watch(session.device))
+            )
             reported += (
                 [others] if (others := peer_effect_text(session, on_purpose=on_purpose)) else []
             )
@@ -97,16 +99,16 @@ class Leaving(Panel):
 
     def _tripping(self, fleet: Fleet, but: Sequence[DriveSession] = ()) -> list[str]:
         """Which drives act on their communication timeout once they are left, and when."""
-        from tui.session.monitor.timeout import left_alone_text, names_of
+        from tui.session.monitor.timeout import names_of, polling_stop_text
 
         reported = {session.device for session in but}
         line_watch = fleet.line_watch
         alike: dict[tuple[str, TimeoutWatch], list[DriveSession]] = {}
         for console in fleet.consoles:
-            watch = line_watch.left_alone().get(console.device)
+            watch = line_watch.pending_timeouts().get(console.device)
             if watch is not None and console.device not in reported:
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
-        found = [left_alone_text(*same, watch=watch) for (_, watch), same in alike.items()]
+        found = [polling_stop_text(*same, watch=watch) for (_, watch), same in alike.items()]
         found += [
             f"{names_of([item])}: what it does on loss of communication was not read yet."
             for item in line_watch.unread()
@@ -230,6 +232,6 @@ class Leaving(Panel):
 def _concerned(fleet: Fleet) -> list[DriveSession]:
     """Drives of a line that run by a command from here, or act once they are left alone."""
     turning = {session.device for session in fleet.line_watch.under_command()}
-    turning |= fleet.line_watch.left_alone().keys()
+    turning |= fleet.line_watch.pending_timeouts().keys()
     turning |= {console.device for console in fleet.consoles if fleet.left_behind(console)}
     return [session for session in fleet.sessions if session.device in turning]

@@ -66,14 +66,14 @@ class RunTelling:
         """When the last cycle failed, time.monotonic()."""
         self._reported = 0.0
 
-    def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
+    def show(self, latest: Snapshot, timeout_text: Callable[[], str]) -> None:
         """A line about the motor once a second; trouble on the line when it begins and ends.
 
-        `left_alone` gives what happens to the motor when polling stops.
+        `timeout_text` gives what happens to the motor when polling stops.
         """
         if latest.error:
             if not self._trouble:
-                complain(f"{latest.error}\n{left_alone()} It is tried on.")
+                complain(f"{latest.error}\n{timeout_text()} It is tried on.")
             self._trouble = latest.time
         elif self._trouble:
             complain("The drive answers again.")

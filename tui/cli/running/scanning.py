@@ -13,7 +13,7 @@ from tui.drive.finding import LineSetting
 
 from ..shared.errors import REFUSED_HERE, Failure
 from ..shared.line_argument import mind_the_drive
-from ..shared.pending_timeouts import left_alone, look_after
+from ..shared.pending_timeouts import look_after, timeout_warning
 from .asking import may_ask, says_yes
 from .scan_telling import Hit, Progress, ScanTelling
 
@@ -247,7 +247,7 @@ class Scan:
         from tui.session.monitor.timeout import timeout_now
 
         await look_after(self.opened, session, self.line_text).learn()
-        text = left_alone(session, timeout_now(session), self.line_text)
+        text = timeout_warning(session, timeout_now(session), self.line_text)
         return text.partition("\n")[0]
 
     async def _reopened(self, setting: LineSetting) -> bool:

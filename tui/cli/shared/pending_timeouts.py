@@ -69,7 +69,7 @@ class PolledDrive:
         if session.arming.times:
             session.timeout = None  # it may have been written
         await self.learn()
-        if text := left_alone(session, timeout_now(session), self.line_text):
+        if text := timeout_warning(session, timeout_now(session), self.line_text):
             with suppress(OSError):
                 say(f"drivepanel: {text}", err=True)
 
@@ -84,7 +84,7 @@ _RUNS_UNSURE = (
 )
 
 
-def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
+def timeout_warning(session: DriveSession, found: Timeout, line_text: str) -> str:
     """Return a drive's reaction when polling stops, and the advice; empty if none."""
     who = f"Device {session.device}, {session.profile.name}"
     if not found.known:

@@ -180,7 +180,7 @@ class GuardedRun:
         """Put an event into the log."""
         log.info("run of device %s: %s, %s", self.device, event, text)
 
-    def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
+    def show(self, latest: Snapshot, timeout_text: Callable[[], str]) -> None:
         """Nothing: scripts read values with their own calls."""
 
     def warn(self, text: str) -> None:

@@ -94,7 +94,7 @@ class LineWatch:
         state, _ = self._last_seen(kept)
         return state is not None and state.motion == "running" and not state.local
 
-    def left_alone(self) -> dict[int, TimeoutWatch]:
+    def pending_timeouts(self) -> dict[int, TimeoutWatch]:
         """Return the drives that react when polling stops, by device; a trip counts at rest too."""
         found = {device: self.watch(device) for device in self._kept}
         return {

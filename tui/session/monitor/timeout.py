@@ -47,7 +47,7 @@ _ACTS = (
 )
 
 
-def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
+def polling_stop_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
     """Return a sentence with the reaction of drives of one family when polling stops."""
     count, names = len(sessions), names_of(sessions)
     if watch is None:

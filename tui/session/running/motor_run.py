@@ -17,7 +17,7 @@ from ..console import DriveConsole
 from ..fleet import Fleet
 from ..journal import Entry
 from ..monitor.snapshot import Snapshot
-from ..monitor.timeout import left_alone_text
+from ..monitor.timeout import polling_stop_text
 from ..reading import with_text
 from ..timeout_report import TimeoutWatch
 from .ending import Ending
@@ -39,8 +39,8 @@ class RunObserver(Protocol):
     def report(self, event: RunEvent, text: str) -> None:
         """Report an event."""
 
-    def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
-        """Show a cycle; `left_alone` gives what happens to the motor when polling stops."""
+    def show(self, latest: Snapshot, timeout_text: Callable[[], str]) -> None:
+        """Show a cycle; `timeout_text` gives what happens to the motor when polling stops."""
 
     def warn(self, text: str) -> None:
         """Report at once that the motor could not be stopped yet."""
@@ -90,7 +90,7 @@ class MotorRun:
             if self.may_turn and not left:
                 await self._bring_to_rest()
         if left:
-            self.observer.report("left-running", self._left_alone())
+            self.observer.report("left-running", self._timeout_text())
         elif stopped:
             raise MotorStopped(
                 f"Device {self.console.device} was stopped by {stopped} before the end."
@@ -106,9 +106,9 @@ class MotorRun:
             if id(entry) not in earlier
         )
 
-    def _left_alone(self) -> str:
+    def _timeout_text(self) -> str:
         """Return the drive's reaction if polling stops."""
-        return left_alone_text(self.console.session, watch=self.watch)
+        return polling_stop_text(self.console.session, watch=self.watch)
 
     async def _started(self) -> bool:
         """Send the run command; return False if the end came first."""
@@ -147,7 +147,7 @@ class MotorRun:
             latest = latest_of(self.console)
             if latest.cycle != seen and latest.time > begun:
                 seen = latest.cycle
-                self.observer.show(latest, self._left_alone)
+                self.observer.show(latest, self._timeout_text)
                 rest = rest + 1 if self._at_rest(latest) else 0
             ended = self.ending.event.is_set()
             if rest >= CYCLES_AT_REST or (rest and ended and latest.state.fault):
@@ -242,7 +242,7 @@ class MotorRun:
                 if not reported:
                     reported = True
                     self.observer.warn(
-                        f"NOT STOPPED yet: {latest.error}\n{self._left_alone()} The motor is"
+                        f"NOT STOPPED yet: {latest.error}\n{self._timeout_text()} The motor is"
                         " stopped as soon as the drive answers. Until then, stop it at the machine."
                     )
             elif not latest.error and latest.time > requested:
