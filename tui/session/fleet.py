@@ -150,7 +150,7 @@ class Fleet:
             return before
         session.guessed = guessed
         session.starts = self.starts
-        session.work.on_tell = partial(self._note_outcome, session.device)
+        session.work.on_report = partial(self._note_outcome, session.device)
         session.byte_order.on_swapped = partial(self.events.add, "failed", device=session.device)
         console = DriveConsole(session, self.journal)
         stated = identity or session.known_identity

@@ -108,7 +108,7 @@ class WorkQueue:
         """Number of stops of this drive, by this program or another one."""
         self.stopped_by = ""
         """Source of the last stop, for a person."""
-        self.on_tell: Callable[[Outcome], None] = lambda _: None
+        self.on_report: Callable[[Outcome], None] = lambda _: None
         """Called, in any thread, with each outcome that is reported."""
         self.on_change: Callable[[], None] = lambda: None
         """Called in the line's thread when a task has ended: the drive may hold other values."""
@@ -124,10 +124,10 @@ class WorkQueue:
 
     # Results
 
-    def tell(self, kind: OutcomeKind, text: str, error: Exception | None = None) -> None:
+    def report(self, kind: OutcomeKind, text: str, error: Exception | None = None) -> None:
         """Report the result of work on the drive."""
         self.outcome = outcome = Outcome(kind, text, self._clock.monotonic(), error)
-        self.on_tell(outcome)
+        self.on_report(outcome)
 
     # Work
 
@@ -173,7 +173,7 @@ class WorkQueue:
             if len(self._waiting) >= MOST_WAITING:
                 raise OrderRefused("Earlier commands are still being carried out.")
             if task.working:
-                self.tell(OutcomeKind.WORKING, task.working)
+                self.report(OutcomeKind.WORKING, task.working)
             self._waiting.append((task, permit))
             if not self.busy:
                 self._turn = turn = object()
@@ -194,7 +194,7 @@ class WorkQueue:
             worker.cancel()
         # a worker that has not begun yet drops nothing
         if self.drop("ended by a stop"):
-            self.tell(OutcomeKind.REFUSED, DROPPED_BY_STOP, Stopped(by))
+            self.report(OutcomeKind.REFUSED, DROPPED_BY_STOP, Stopped(by))
 
     def drop(self, why: str) -> bool:
         """Drop the tasks that wait; return True if there were any."""
@@ -203,7 +203,7 @@ class WorkQueue:
         for task, _ in waiting:
             _given_up(task)
         if waiting:
-            self.tell(OutcomeKind.REFUSED, f"Not done: {why}.")
+            self.report(OutcomeKind.REFUSED, f"Not done: {why}.")
         return bool(waiting)
 
     async def _serve(self, turn: object) -> None:
@@ -229,7 +229,7 @@ class WorkQueue:
             if task.armed:
                 permit.check()
             if text := await task.carry_out(permit):
-                self.tell(OutcomeKind.DONE, text)
+                self.report(OutcomeKind.DONE, text)
         except Superseded:
             return
         except (LineError, DriveError) as error:
@@ -239,7 +239,7 @@ class WorkQueue:
             self._fail(task, turn, error, f"It failed ({type(error).__name__}: {error}).")
         except asyncio.CancelledError:
             text = " ".join([BY_STOP, *_given_up(task)])
-            self.tell(OutcomeKind.REFUSED, text, Stopped(self.stopped_by))
+            self.report(OutcomeKind.REFUSED, text, Stopped(self.stopped_by))
             raise
         finally:
             self.on_change()
@@ -248,7 +248,7 @@ class WorkQueue:
         # tasks that wait after a stop belong to another worker
         dropped = turn is self._turn and self.drop("a command before it was refused")
         rest = ["The commands after it were canceled."] if dropped else []
-        self.tell(OutcomeKind.REFUSED, " ".join([text, *rest, *_given_up(task)]), error)
+        self.report(OutcomeKind.REFUSED, " ".join([text, *rest, *_given_up(task)]), error)
 
 
 def _given_up(task: Task) -> list[str]:

@@ -73,7 +73,7 @@ class RunTelling:
         """
         if latest.error:
             if not self._trouble:
-                complain(f"{latest.error}\n{timeout_text()} It is tried on.")
+                complain(f"{latest.error}\n{timeout_text()} Retrying.")
             self._trouble = latest.time
         elif self._trouble:
             complain("The drive answers again.")

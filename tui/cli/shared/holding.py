@@ -68,7 +68,7 @@ class Holding:
         if look.error:
             if device not in self.lost:
                 self.lost.add(device)
-                self.tell("lost", device, f"{look.error} It is tried on.")
+                self.tell("lost", device, f"{look.error} Retrying.")
             return
         if device in self.lost:
             self.lost.discard(device)

@@ -71,9 +71,9 @@ class TeachKeys(ArmingKeys):
         try:
             lesson = await teacher.look(code, text)
         except (DriveError, LineError) as error:
-            work.tell(OutcomeKind.REFUSED, str(error))
+            work.report(OutcomeKind.REFUSED, str(error))
         else:
-            work.tell(OutcomeKind.REFUSED if lesson.went_wrong else OutcomeKind.DONE, lesson.text)
+            work.report(OutcomeKind.REFUSED if lesson.went_wrong else OutcomeKind.DONE, lesson.text)
             if teacher.trouble:
                 self.app.notify(teacher.trouble, severity="warning")
             if teacher.proposal() == code and self.is_current:
@@ -108,9 +108,9 @@ class TeachKeys(ArmingKeys):
         """Make a change that waits for the disk, and report its result."""
         work = self.session.work
         try:
-            work.tell(OutcomeKind.DONE, await asyncio.to_thread(change))
+            work.report(OutcomeKind.DONE, await asyncio.to_thread(change))
         except DriveError as error:
-            work.tell(OutcomeKind.REFUSED, str(error))
+            work.report(OutcomeKind.REFUSED, str(error))
         if self.teacher.trouble:
             self.app.notify(self.teacher.trouble, severity="warning")
         self.look()

@@ -113,7 +113,7 @@ def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: boo
     async def carry_out(permit: Permit) -> str:
         def tell(text: str) -> None:
             # in the place of what is told of the work, which stands before all that was said
-            session.work.tell(OutcomeKind.WORKING, f"Test: {text} Polling is paused.")
+            session.work.report(OutcomeKind.WORKING, f"Test: {text} Polling is paused.")
 
         prover = Prover(session, console.journal, permit, turning, tell)
         try:

@@ -326,7 +326,7 @@ class BlockEditor:
         self._say(text, OutcomeKind.REFUSED)
 
     def _say(self, text: str, kind: OutcomeKind) -> None:
-        self.session.work.tell(kind, text)
+        self.session.work.report(kind, text)
 
 
 _WRONG = {

@@ -179,7 +179,7 @@ class Commander:
 
     def refuse(self, text: str) -> None:
         """Report why a command was not given."""
-        self.session.work.tell(OutcomeKind.REFUSED, text)
+        self.session.work.report(OutcomeKind.REFUSED, text)
 
     def _take_steps(self) -> Decimal:
         """Return the sum of the steps that wait, and forget them."""

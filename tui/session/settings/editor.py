@@ -286,7 +286,7 @@ class Editor:
             self._say(str(refused), OutcomeKind.REFUSED)
 
     def _say(self, text: str, kind: OutcomeKind) -> None:
-        self.session.work.tell(kind, text)
+        self.session.work.report(kind, text)
 
 
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
