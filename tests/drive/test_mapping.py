@@ -295,7 +295,7 @@ def test_neighbors_are_suggested_within_the_limit(family: str) -> None:
     assert found, "the monitoring set has neighbors"
     function = profile.function(3)
     assert function is not None
-    brought = [code for stretch in found for code in stretch.brings]
+    brought = [code for stretch in found for code in stretch.codes]
     assert len(brought) == len(set(brought))
     for stretch in found:
         assert stretch.request.count <= (function.max_read or 0)

@@ -173,7 +173,7 @@ async def test_block_is_configured_then_pending_then_active() -> None:
         await here.session.line.write(1, here.profile["F878"].address, [3])
         view = await mapper.verify(read)
         assert [s.force for s in view.slots[2:4]] == [Force.PENDING] * 2
-        assert [s.brings for s in view.slots[2:4]] == ["FE03", "FE05"]
+        assert [s.returned_code for s in view.slots[2:4]] == ["FE03", "FE05"]
         # two values that move may be alike for once
         assert SlotMatch.SAME not in {s.verdict for s in view.slots[2:4]}
         here.drive.power_cycle()

@@ -103,16 +103,16 @@ def test_two_comparisons_are_not_enough() -> None:
 def test_replacement_for_an_assignment_is_reported() -> None:
     behind = dict.fromkeys(BLOCK.slots, CODES[2])
     proof = compared(behind, APART, 2, random.Random(1), CHOSEN)
-    assert {proof.brings(slot) for slot in BLOCK.slots} == {""}
+    assert {proof.returned_code(slot) for slot in BLOCK.slots} == {""}
     assert not any(proof.excludes(slot, RAWS[code]) for slot, code in CHOSEN.items())
     proof = compared(behind, APART, 3, random.Random(1), CHOSEN)
-    assert {proof.brings(slot) for slot in BLOCK.slots} == {CODES[2]}
+    assert {proof.returned_code(slot) for slot in BLOCK.slots} == {CODES[2]}
     excluded = [slot for slot, code in CHOSEN.items() if proof.excludes(slot, RAWS[code])]
     assert excluded == [slot for slot in BLOCK.slots if slot != "F877"]
     # equal values cannot be distinguished from each other, but from the assigned one
     alike = APART | {CODES[5]: APART[CODES[2]]}
     proof = compared(behind, alike, 3, random.Random(1), CHOSEN)
-    assert proof.brings("F875") == ""
+    assert proof.returned_code("F875") == ""
     assert proof.excludes("F875", RAWS[CODES[0]])
 
 
@@ -202,7 +202,7 @@ def test_only_true_assignments_are_confirmed(
     }
     proof = compared(real, given, rounds, chance, wanted)
     for slot, code in real.items():
-        assert proof.brings(slot) in ("", code), (slot, code)
+        assert proof.returned_code(slot) in ("", code), (slot, code)
         # a fluctuating value may miss its own two readings by chance: its slot is not used then
         assert given[code].noise or not proof.excludes(slot, RAWS[code]), (slot, code)
         for other in CODES:

@@ -123,7 +123,11 @@ def plan_reads(
             raise DriveError(f"{parameter.code} of {profile.name} can only be written.")
     best: ReadPlan | None = None
     options = [
-        [stretch for stretch in _stretches(profile, block, slots or {}) if stretch.brings(wanted)]
+        [
+            stretch
+            for stretch in _stretches(profile, block, slots or {})
+            if stretch.reads_any(wanted)
+        ]
         for block in profile.data.blocks
     ]
     for choice in product(*([None, *stretches] for stretches in options)):
@@ -158,7 +162,7 @@ class _Stretch:
     slots: Mapping[str, int]
     checked: bool
 
-    def brings(self, wanted: Mapping[str, Parameter]) -> bool:
+    def reads_any(self, wanted: Mapping[str, Parameter]) -> bool:
         """Return True if it reads any of these parameters."""
         return any(place.code in wanted for place in self.request.places)
 

@@ -121,7 +121,7 @@ def _slot_field(slot: Slot) -> SlotField:
         direct=value_field(slot.direct) if slot.direct else None,
         verdict=str(slot.verdict),
         force=str(slot.force) or None,
-        brings=slot.brings or None,
+        brings=slot.returned_code or None,
     )
 
 
@@ -168,7 +168,7 @@ def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...
         slot.text,
         slot.direct_text,
         str(slot.verdict),
-        f"{force}, brings {slot.brings}" if slot.brings else force,
+        f"{force}, returns {slot.returned_code}" if slot.returned_code else force,
     )
 
 
@@ -198,7 +198,7 @@ def show_neighbors(session: DriveSession, line_text: str, *, as_json: bool) -> N
         request = stretch.request
         say(
             f"{request.count:2d} words from {request.address} (16#{request.address:04X}):"
-            f" {', '.join(stretch.brings)}; {stretch.cost / 1000:.1f} ms,"
+            f" {', '.join(stretch.codes)}; {stretch.cost / 1000:.1f} ms,"
             f" one by one {stretch.alone / 1000:.1f} ms"
         )
 
@@ -209,7 +209,7 @@ def _neighbor_field(stretch: Stretch) -> NeighborReadField:
     return NeighborReadField(
         address=stretch.request.address,
         count=stretch.request.count,
-        codes=list(stretch.brings),
+        codes=list(stretch.codes),
         beside=list(stretch.beside),
         us=stretch.cost,
         one_by_one_us=stretch.alone,

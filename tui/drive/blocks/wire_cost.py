@@ -47,7 +47,7 @@ class Stretch:
     """A read of adjacent words: the request, its parameters, its time and its savings."""
 
     request: ReadRequest
-    brings: tuple[str, ...]
+    codes: tuple[str, ...]
     """Codes of the requested parameters in it."""
     beside: tuple[str, ...]
     """Codes of other parameters in it; they cost only the time of their words."""
@@ -188,7 +188,7 @@ def stretches(
         if best is None:
             break
         found.append(best)
-        left = [p for p in left if p.code not in best.brings]
+        left = [p for p in left if p.code not in best.codes]
     return found
 
 

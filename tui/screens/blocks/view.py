@@ -201,8 +201,8 @@ def _force_text(slot: Slot) -> str:
     if slot.force is Force.ACTIVE:
         return "Active: only this parameter can have brought that value; it cannot be read."
     if slot.force is Force.PENDING:
-        brings = f" Until then it returns {slot.brings}." if slot.brings else ""
-        return f"Pending: takes effect after the drive's next reset or power-up.{brings}"
+        until = f" Until then it returns {slot.returned_code}." if slot.returned_code else ""
+        return f"Pending: takes effect after the drive's next reset or power-up.{until}"
     return "Configured. It cannot be read if this mapping is active."
 
 
@@ -302,7 +302,7 @@ def stretch_lines(
         head.append(_ms(stretch.cost), STRONG)
         head.append(f"  one by one {_ms(stretch.alone)}, saves {_ms(stretch.saves)}", FAINT)
         lines.append(head)
-        lines += [Text(f"    {t}", PLAIN) for t in wrapped(", ".join(stretch.brings), width - 5, 2)]
+        lines += [Text(f"    {t}", PLAIN) for t in wrapped(", ".join(stretch.codes), width - 5, 2)]
         if stretch.beside:
             text = f"also read: {', '.join(stretch.beside)}"
             lines += [Text(f"    {t}", FAINT) for t in wrapped(text, width - 5, 1)]

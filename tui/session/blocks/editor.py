@@ -332,8 +332,8 @@ class BlockEditor:
 _WRONG = {
     (False, False): "{slot.code} {slot.verdict}",
     (False, True): "{slot.code} {slot.verdict} until the next reset",
-    (True, False): "{slot.code} {slot.verdict}, returns {slot.brings}",
-    (True, True): "{slot.code} {slot.verdict}, returns {slot.brings} until the next reset",
+    (True, False): "{slot.code} {slot.verdict}, returns {slot.returned_code}",
+    (True, True): "{slot.code} {slot.verdict}, returns {slot.returned_code} until the next reset",
 }
 """By whether the slot brings something, and whether it waits for a reset."""
 
@@ -350,7 +350,7 @@ def _verdict(views: list[BlockView]) -> tuple[str, bool]:
         for slot in view.slots:
             counted += slot.verdict in (SlotMatch.SAME, SlotMatch.MOVING)
             if slot.verdict in (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE):
-                text = _WRONG[bool(slot.brings), slot.force is Force.PENDING]
+                text = _WRONG[bool(slot.returned_code), slot.force is Force.PENDING]
                 wrong.append(text.format(slot=slot))
     text = f"{counted} slots match direct reads."
     if wrong:

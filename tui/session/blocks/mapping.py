@@ -57,7 +57,7 @@ class Slot:
     direct: Reading | None = None
     verdict: SlotMatch = SlotMatch.UNREAD
     force: Force = Force.NOTHING
-    brings: str = ""
+    returned_code: str = ""
     """Code of the parameter that it returns instead of the chosen one, if that is certain."""
 
     @property
@@ -234,8 +234,10 @@ class Mapper:
             return Slot(slot, raw, verdict=SlotMatch.UNUSED)
         if raw is None or parameter is None:
             return Slot(slot, raw, word=word, verdict=SlotMatch.NONE)
-        force, brings = self._force(proof, slot, raw)
-        reported = replace(now, direct=direct.get(parameter.code), force=force, brings=brings)
+        force, returned = self._force(proof, slot, raw)
+        reported = replace(
+            now, direct=direct.get(parameter.code), force=force, returned_code=returned
+        )
         if word is None or word_count(parameter) != 1:
             return replace(reported, word=None)
         if word == self.session.profile.data.reading.unknown_word:
@@ -247,7 +249,7 @@ class Mapper:
             and not proof.fitted(slot, parameter.code)
         ):
             # its value from the round in which it matched
-            return replace(was, verdict=verdict, force=force, brings=brings)
+            return replace(was, verdict=verdict, force=force, returned_code=returned)
         text = self._text(parameter, through)
         if verdict is SlotMatch.DIFFERS and proof.block.direction == "read":
             # it is not the value of this parameter, so it has neither its scale nor its unit
@@ -265,5 +267,5 @@ class Mapper:
         if known or proof.holds(slot, raw):
             return Force.ACTIVE, ""
         if proof.excludes(slot, raw):
-            return Force.PENDING, proof.brings(slot)
+            return Force.PENDING, proof.returned_code(slot)
         return (Force.PENDING if self.written.get(slot) == raw else Force.UNPROVED), ""

@@ -20,7 +20,7 @@ from .place import PlaceToListen, line_to_listen
 from .port_listener import PortListener
 from .summary import ListeningSummary
 
-FRAMES_KEPT = 1000
+LISTENED_FRAMES = 1000
 READ_WITHIN = 0.1
 """Seconds within which monitoring ends after a request."""
 SUMMED_UP_EVERY = 1.0
@@ -44,7 +44,7 @@ class BackgroundListener:
         self._over = threading.Event()
         self._stack = ExitStack()
         self._thread: threading.Thread | None = None
-        self._trace = Trace(FRAMES_KEPT)
+        self._trace = Trace(LISTENED_FRAMES)
         self._summed: tuple[float, ListeningSummary] | None = None
         self.trouble = ""
         """Error that ended monitoring; empty while it runs or after `close`."""

@@ -92,7 +92,7 @@ class SlotEvidence:
             if self.holds(slot, raw):
                 self._sure[slot] = self._code(raw)
 
-    def brings(self, slot: str) -> str:
+    def returned_code(self, slot: str) -> str:
         """Return the parameter code identified for a place; empty if none yet."""
         if slot in self._sure:
             return self._sure[slot]
@@ -102,7 +102,7 @@ class SlotEvidence:
     def holds(self, slot: str, raw: int) -> bool:
         """Return True if a place certainly returns the parameter that its slot selects."""
         code = self._code(raw)
-        return bool(code) and self.brings(slot) == code
+        return bool(code) and self.returned_code(slot) == code
 
     def excludes(self, slot: str, raw: int) -> bool:
         """Return True if a place certainly returns another parameter than its slot selects."""
