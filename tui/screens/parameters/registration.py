@@ -68,7 +68,7 @@ REGISTERED = (
                 ("confirm", "y", "", KEEP),
                 ("stage_set", "i", "", "Stage the differences from the compared file."),
                 ("report", "", "", "Write a report on this drive (Markdown)."),
-                ("factory", "F", "", "Recall the factory settings. Needs arming; asks first."),
+                ("factory", "F", "", "Restore the factory settings. Needs arming; asks first."),
                 ("leave", "escape", "", "Leave the search, then the selection, then the screen."),
             ),
             TEACH,

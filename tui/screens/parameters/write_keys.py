@@ -195,10 +195,10 @@ class WriteKeys(ParameterKeys):
         self._memory("Save to EEPROM?", save_order, self.editor.save)
 
     def action_factory(self) -> None:
-        """Recall the factory settings, after saying what happens."""
+        """Restore the factory settings, after saying what happens."""
         from tui.drive.settings.memory_orders import factory_order
 
-        self._memory("Recall the factory settings?", factory_order, self.editor.factory)
+        self._memory("Restore the factory settings?", factory_order, self.editor.factory)
 
     def _memory(
         self, question: str, order_of: Callable[[Profile], MemoryOrder], work: Callable[[int], None]
