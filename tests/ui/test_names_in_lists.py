@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 import pytest
 
 from tui.drive.blocks.picking import choices, raw_of
+from tui.drive.control_source import source_changes
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.edits import Edit, Edits
@@ -19,9 +20,15 @@ from tui.screens.blocks.pick_parameter import (
     pick_lines,
 )
 from tui.screens.blocks.view import table_lines
+from tui.screens.choosing import AROUND_PALETTE, WIDEST_PALETTE, action_lines
+from tui.screens.command.teaching import teach_lines
+from tui.screens.control.view import change_lines
 from tui.screens.faults.doctor import LABEL, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
 from tui.screens.faults.view import stored_lines
+from tui.screens.keys.finding import find
+from tui.screens.keys.screens import SCREENS
+from tui.screens.monitor.motor import other_values, value_labels
 from tui.screens.parameters.group_view import group_lines
 from tui.screens.parameters.parameter_list import FIRST, LAST, ParameterList
 from tui.screens.parameters.screen import NARROW, WIDE
@@ -157,6 +164,39 @@ def test_pick_list_of_a_slot(family: str) -> None:
                     ] == [p.name for p in parameters]
 
 
+def test_actions_of_the_palette() -> None:
+    for screen in SCREENS:
+        for typed in ("", "a", "w", "s"):
+            found = find(typed, screen.name)
+            for width in WIDTHS.values():
+                cells = min(WIDEST_PALETTE, width) - AROUND_PALETTE
+                texts = [line.plain for line in action_lines(found, cells)]
+                assert {len(text) for text in texts} <= {cells}
+                assert alike(texts) == [], (screen.name, typed, width)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_words_to_teach(family: str) -> None:
+    profile = library.load(family)
+    console = fakes.console_of(None, family=family)
+    codes = [p.code for p in profile.parameters if p.access == "r" and not p.bits]
+    for width in (54, 64):
+        texts = [line.plain for line in teach_lines(console, codes, width)]
+        assert alike([text[9:] for text in texts]) == [], width
+        assert max(map(len, texts)) <= width
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_changes_of_the_command_source(family: str) -> None:
+    profile = library.load(family)
+    for source in profile.data.control_sources:
+        found = source_changes(profile, source, {})
+        for width in WIDTHS.values():
+            texts = [line.plain for line in change_lines(profile, found, width)]
+            assert alike([text[10:] for text in texts]) == []
+            assert max(map(len, texts)) <= width
+
+
 @pytest.mark.parametrize("family", ["atv21", "atv71"])
 def test_slots_of_a_block(family: str) -> None:
     block_editor = desk_on(family)
@@ -206,3 +246,15 @@ def test_values_stored_with_a_fault(family: str) -> None:
             lines = [line.plain for line in stored_lines(profile, codes, readings, width)]
             assert alike([line[7:] for line in lines]) == [], width
             assert max(map(len, lines)) <= width
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_values_of_monitor(family: str) -> None:
+    profile = library.load(family)
+    for wide in (False, True):
+        values = other_values(profile, wide=wide)
+        for cells in range(19, 60):
+            for barred in (False, True):
+                labels = value_labels(profile, values, cells, barred)
+                assert alike(labels) == [], cells
+                assert len({len(label) for label in labels}) <= 1

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
+from textual.events import Resize
 from textual.widgets import OptionList
 
 from tui.screens.keys.finding import FoundAction, find
-from tui.widgets.drawing import cut
+from tui.widgets.drawing import cut, fitted_names
 from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.palette import FAINT, KEY, PLAIN
 from tui.widgets.plain import Plain, entry
@@ -22,11 +24,38 @@ from .dialogs.question import Question, hint
 if TYPE_CHECKING:
     from .app_port import Panel
 
-NAME_WIDTH, PLACE_WIDTH, KEY_WIDTH = 48, 14, 5
-"""Columns; where an action can be done here, its name has those of the place too."""
+PLACE_WIDTH, KEY_WIDTH = 14, 5
+"""Cells of the screen and the key; an action of this screen has those of the place for its name."""
+WIDEST_PALETTE, AROUND_PALETTE = 110, 6
+"""Cells of the dialog at most, and those around a line."""
 
 
 MORE = "Typing also searches the other screens."
+
+
+def action_lines(found: Sequence[FoundAction], width: int) -> list[Text]:
+    """Return a line for each action: its name, its screen if that is another, its key."""
+    keys = max([KEY_WIDTH, *(len(item.action.shown) for item in found)])
+    here = width - keys - 1
+    room = {True: here, False: here - PLACE_WIDTH - 1}
+    fitted = {
+        place: fitted_names(tuple(item.name for item in found if item.here is place), cells)
+        for place, cells in room.items()
+    }
+    return [
+        _action_line(item, f"{fitted[item.here][item.name]:<{room[item.here]}}", keys)
+        for item in found
+    ]
+
+
+def _action_line(found: FoundAction, name: str, keys: int) -> Text:
+    text = Text(no_wrap=True)
+    if found.here:
+        text.append(name, PLAIN)
+    else:
+        text.append(f"{name} ", FAINT)
+        text.append(cut(found.screen.capitalize(), PLACE_WIDTH), FAINT)
+    return text.append(f"{found.action.shown:>{keys}} ", KEY)
 
 
 class Palette(Question[FoundAction | None]):
@@ -69,7 +98,8 @@ class Palette(Question[FoundAction | None]):
         self._found = find(query, self._of)
         options = self.query_one(OptionList)
         options.clear_options()
-        options.add_options([entry(self._line(found)) for found in self._found])
+        width = min(WIDEST_PALETTE, self.app.size.width) - AROUND_PALETTE
+        options.add_options([entry(line) for line in action_lines(self._found, width)])
         ready = bool(self._found) and self._found[0].ready
         options.highlighted = 0 if ready else None
         count = "No match. Delete some letters."
@@ -79,15 +109,13 @@ class Palette(Question[FoundAction | None]):
         self.query_one("#count", Plain).update(count)
         self._tell_keys()
 
-    def _line(self, found: FoundAction) -> Text:
-        text = Text(no_wrap=True)
-        if found.here:
-            text.append(cut(found.name, NAME_WIDTH + 1 + PLACE_WIDTH), PLAIN)
-        else:
-            text.append(f"{cut(found.name, NAME_WIDTH)} ", FAINT)
-            text.append(cut(found.screen.capitalize(), PLACE_WIDTH), FAINT)
-        text.append(f"{found.action.shown:>{KEY_WIDTH}} ", KEY)
-        return text
+    def on_resize(self, _: Resize) -> None:
+        """Give the names the new width; the choice stays."""
+        options = self.query_one(OptionList)
+        at = options.highlighted
+        self._list(self.query_one(WordField).words)
+        options.highlighted = at
+        self._tell_keys()
 
     def action_step(self, step: int) -> None:
         """Another one of the list; the first step chooses the first."""

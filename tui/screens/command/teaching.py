@@ -18,7 +18,7 @@ from tui.drive.shown import shown
 from tui.drive.taught_profile import teachable_codes, why_not_taught
 from tui.drive.teaching import parse_display
 from tui.session.work import OutcomeKind
-from tui.widgets.drawing import short
+from tui.widgets.drawing import fitted_names
 from tui.widgets.palette import FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
@@ -32,7 +32,10 @@ if TYPE_CHECKING:
     from ..dialogs.now import MotorStates
 
 HOW = "Type it with its unit: 50.3Hz, 8.4A, 1450rpm. The word is read when Enter is pressed."
-WORD_NAME_WIDTH = 30
+WIDEST_LIST, AROUND_LIST = 70, 6
+"""Cells of the dialog at most, and those around a line of its list."""
+BESIDE_WORD = 30
+"""Cells of a line without the name."""
 
 
 class TeachKeys(ArmingKeys):
@@ -130,8 +133,9 @@ class PickWord(KeyQuestion[str | None]):
         with Vertical(id="dialog"):
             yield Plain("Which value shall be taught?", id="question")
             yield from self.now_lines()
-            lines = (entry(word_to_teach(self._drive_console, code), id=code_id(at)) for at, code in
-                     enumerate(self._codes))  # fmt: skip
+            width = min(WIDEST_LIST, self.app.size.width) - AROUND_LIST
+            texts = teach_lines(self._drive_console, self._codes, width)
+            lines = (entry(text, id=code_id(at)) for at, text in enumerate(texts))
             yield OptionList(*lines, id="choices", compact=True)
             keys = (("Up, Down", "choose"), ("Enter", "continue"), ("Esc or q", "no"))
             yield Plain("Others: Parameters (3), L.", id="about")
@@ -147,14 +151,19 @@ def code_id(place: int) -> str:
     return f"word{place}"
 
 
-def word_to_teach(console: DriveConsole, code: str) -> Text:
-    """A line of the list: code, name, and what it reads now."""
+def teach_lines(console: DriveConsole, codes: Sequence[str], width: int) -> list[Text]:
+    """Return a line for each word: code, name, and the value that it holds now."""
+    profile = console.session.profile
+    room = width - BESIDE_WORD
+    names = fitted_names(tuple(profile[code].name for code in codes), room)
+    return [_teach_line(console, code, f"{names[profile[code].name]:<{room}}") for code in codes]
+
+
+def _teach_line(console: DriveConsole, code: str, name: str) -> Text:
     session = console.session
-    raw = session.image.raws.get(code)
     text = Text(f" {code:<8}", PLAIN, no_wrap=True)
-    text.append(
-        f"{short(session.profile[code].name, WORD_NAME_WIDTH - 1):<{WORD_NAME_WIDTH}}", PLAIN
-    )
+    text.append(f"{name} ", PLAIN)
+    raw = session.image.raws.get(code)
     if raw is None:
         return text.append("not read yet", FAINT)
     value = shown(session.profile, session.profile[code], raw, session.image.raws)

@@ -13,12 +13,14 @@ from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.drive_state import channel_text
 from tui.session.monitor.snapshot import Snapshot
-from tui.widgets.drawing import cut, wrapped
+from tui.widgets.drawing import cut, fitted_names, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
 
 SOURCE_WIDTH = 16
 WIRE = 18
 LEFT_ROWS = 3
+CHANGE_CODE, CHANGE_NAME = 10, 12
+"""Cells of the code of a change, and those of its name at least."""
 
 
 def now_lines(
@@ -100,17 +102,27 @@ def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) ->
     """Return the pending writes, word by word."""
     if not found:
         return [Text("   Nothing: the drive is set up so.", STRONG)]
-    return [_change(profile, change, width) for change in found]
+    values = [(_named(profile, c, c.old), _named(profile, c, c.new)) for c in found]
+    names = tuple(change.parameter.name for change in found)
+    beside = CHANGE_CODE + len(" ") + max(len(f"{old} → {new}") for old, new in values)
+    room = max(CHANGE_NAME, min(width - beside, max(map(len, names))))
+    fitted = fitted_names(names, room)
+    return [
+        _change(change, f"{fitted[name]:<{room}}", *texts, width)
+        for change, name, texts in zip(found, names, values, strict=True)
+    ]
 
 
-def _change(profile: Profile, change: SourceChange, width: int) -> Text:
-    parameter = change.parameter
+def _change(change: SourceChange, name: str, old: str, new: str, width: int) -> Text:
     text = Text(no_wrap=True)
     mark = "" if change.verified else "?"
-    text.append(f"   {parameter.code + mark:<7}", PLAIN if change.verified else ALARM)
-    text.append(cut(parameter.name, 26) + " ", FAINT)
-    text.append(f"{_named(profile, change, change.old)} → ", FAINT)
-    text.append(_named(profile, change, change.new), STRONG)
+    text.append(
+        f"   {change.parameter.code + mark:<{CHANGE_CODE - 3}}",
+        PLAIN if change.verified else ALARM,
+    )
+    text.append(f"{name} ", FAINT)
+    text.append(f"{old} → ", FAINT)
+    text.append(new, STRONG)
     text.truncate(width, overflow="ellipsis")
     return text
 

@@ -12,7 +12,7 @@ from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.monitor.trend import readout_parameter
 from tui.session.shown import Quality
-from tui.widgets.drawing import short
+from tui.widgets.drawing import fitted_names, short
 from tui.widgets.gauge import gauge
 from tui.widgets.palette import FAINT, STALE, STRONG, age_text
 
@@ -90,9 +90,10 @@ def motor_lines(
     values = other_values(view.profile, wide=wide)[: rows * columns]
     cells = (width - 1) // columns
     barred = any(value.high for value in values)
+    labels = value_labels(view.profile, values, cells, barred)
     lines = [Text(" ", no_wrap=True) for _ in range(rows)]
-    for at, value in enumerate(values):
-        place = _value(view, value, cells, barred)
+    for at, (value, label) in enumerate(zip(values, labels, strict=True)):
+        place = _value(view, value, label, cells, barred)
         lines[at % rows].append_text(place).append(" " * (cells - place.cell_len))
     return lines
 
@@ -103,17 +104,25 @@ def value_cells(cells: int, barred: bool) -> int:
     return VALUE_CELLS if barred and cells >= with_bar else min(cells - 2, VALUE_CELLS_MOST)
 
 
-def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text:
+def value_labels(
+    profile: Profile, values: Sequence[MonitoringValue], cells: int, barred: bool
+) -> list[str]:
+    """Return the names of values with their marks, in the cells of a column and no two alike."""
+    numbers = SHORT_NUMBER_CELLS if cells < SHORT_FROM else NUMBER_CELLS
+    room = value_cells(cells, barred) - numbers - UNIT_CELLS - 1
+    parameters = [profile[value.parameter] for value in values]
+    marks = [f" {mark_of(profile, parameter)}".rstrip() for parameter in parameters]
+    names = [_label(parameter, is_short=cells < SHORT_FROM) for parameter in parameters]
+    fitted = fitted_names(tuple(names), max(1, room - max(map(len, marks), default=0)))
+    return [f"{fitted[name]}{mark}".ljust(room) for name, mark in zip(names, marks, strict=True)]
+
+
+def _value(view: View, value: MonitoringValue, label: str, cells: int, barred: bool) -> Text:
     """Its name, its number to the right, its unit; behind it a bar where there is room."""
     parameter = view.profile[value.parameter]
     columns = value_cells(cells, barred)
-    mark = f" {mark_of(view.profile, parameter)}".rstrip()
-    is_short = cells < SHORT_FROM
-    numbers = SHORT_NUMBER_CELLS if is_short else NUMBER_CELLS
-    name = _label(parameter, is_short=is_short)
-    room = columns - numbers - UNIT_CELLS - 1
-    label = short(name, room - len(mark)) + mark
-    text = Text(f"{label:<{room}}", FAINT, no_wrap=True)
+    numbers = SHORT_NUMBER_CELLS if cells < SHORT_FROM else NUMBER_CELLS
+    text = Text(label, FAINT, no_wrap=True)
     reading = view.reading(value.parameter)
     if reading is None or reading.raw is None:
         text.append(f"{NOT_AVAILABLE:>{numbers}}", FAINT)
