@@ -157,6 +157,11 @@ EXCEPTIONS: dict[tuple[int, str, str], str] = {
 
 GLUED = {
     ("tui/drive/sentences.py", "{text.rstrip('.')}"): "the one function that ends sentences",
+    (
+        "tui/screens/keys/pages.py",
+        "' or '.join((key_text(key) for key in action.keys.split(',')))",
+    ): ("pages of the documentation, which tests read"),
+    ("tui/screens/monitor/words.py", "message[:1].upper()"): "a text of a bit alone is a label",
 }
 """By module and source of a glued text: the reason why it stays."""
 
@@ -378,6 +383,7 @@ def test_glue_is_found(form: str, source: str) -> None:
         "text = ' '.join([text, 'Press s to scan again.'])",
         "text = f'{text} Press s to scan again.'",
         "key = ' stop'",
+        "label = ' load of the line '",
         "path = name + '.toml'",
         "head = text.removesuffix(' of the drive')",
         "'''Document, with text.'''",

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.style import Style
 
+from tui.drive.sentences import counted
 from tui.safety import LOOK_IS_OLD
 from tui.session.command.stop_report import NOT_STOPPED
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT
@@ -118,7 +119,7 @@ class FrameSource:
         count = len(fleet.found) if fleet else 0
         parts = [self._app.line_label]
         if count:
-            parts.append(f"{count} drive{'' if count == 1 else 's'}")
+            parts.append(counted(count, "1 drive", "{count} drives"))
         if fleet is not None and fleet.search is not None and fleet.search.goes_on:
             parts.append(f"scan {fleet.search.text}")
         if len(self._app.panel_lines) > 1:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from tui.drive.sentences import counted
 from tui.session.command.stop_report import AT_THE_MACHINE
 
 if TYPE_CHECKING:
@@ -121,7 +122,8 @@ class LastStops(NamedTuple):
         ]
         if not devices:
             return ""
-        return f"Stopping device{'s' if len(devices) > 1 else ''} {', '.join(devices)}."
+        single, several = "Stopping device {devices}.", "Stopping devices {devices}."
+        return counted(len(devices), single, several, devices=", ".join(devices))
 
     def follow(self) -> str:
         """Wait for the standstill of all, for a bounded time; the result of each."""

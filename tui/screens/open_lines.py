@@ -90,8 +90,9 @@ class LineEvents(EventLog):
         """Text and device of an event as all lines have it."""
         if self._is_shown():
             return text, device
-        drive = "" if device is None else f", drive {device}"
-        return f"{self._label}{drive}: {text}", None
+        if device is None:
+            return f"{self._label}: {text}", None
+        return f"{self._label}, drive {device}: {text}", None
 
     @property
     def newest(self) -> Event | None:

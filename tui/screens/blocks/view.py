@@ -223,7 +223,7 @@ def cost_lines(
         text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
         text.append(f" in {saving.before.requests}", FAINT)
         if _waits_for_a_reset(block_editor):
-            text.append(" after a reset", ALARM)
+            text.append(" · after a reset", ALARM)
         if block_editor.proposals.plans:
             text.append("  → proposed ", FAINT)
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
@@ -296,9 +296,9 @@ def stretch_lines(
     lines: list[Text] = []
     for stretch in found:
         request = stretch.request
-        head = Text(no_wrap=True)
-        head.append(f" {request.count:>2} words", STRONG)
-        head.append(f" from {request.address} (16#{request.address:04X})  ", PLAIN)
+        count, address = f" {request.count:>2} words", request.address
+        head = Text(f"{count} from {address} (16#{address:04X})  ", PLAIN, no_wrap=True)
+        head.stylize(STRONG, 0, len(count))
         head.append(_ms(stretch.cost), STRONG)
         head.append(f"  one by one {_ms(stretch.alone)}, saves {_ms(stretch.saves)}", FAINT)
         lines.append(head)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from tui.bus.api import Frame
 from tui.drive.profile.profile import Profile
+from tui.drive.sentences import counted
 from tui.drive.shown import shown
 from tui.drive.values import from_words, word_count
 from tui.session.listening.words import FUNCTION_NAMES
@@ -123,9 +124,8 @@ class _Words:
         found = [code for code, _, _ in self._cut(address, [0] * count)]
         named = [code for code in found if code]
         if not named:
-            return f"{address} ({address:#06x}), {count} word{'' if count == 1 else 's'}".replace(
-                "0x", "16#"
-            )
+            single, several = "{at} (16#{at:04x}), 1 word", "{at} (16#{at:04x}), {count} words"
+            return counted(count, single, several, at=address)
         more = len(found) - CODES_OF_FRAME
         codes = " ".join(code or "?" for code in found[:CODES_OF_FRAME])
         return f"{codes} + {more} more" if more > 0 else codes

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from rich.text import Text
 
+from tui.drive.sentences import counted
 from tui.session.listening.background import BackgroundListener
 from tui.session.listening.summary import ListeningSummary, summary_lines
 from tui.widgets.drawing import rule, wrapped
@@ -34,7 +35,7 @@ def heard_lines(
     shown = lines[top : top + room]
     drives = sum(bool(drive.tally.device) for drive in summary.drives)
     more = "" if len(lines) <= room else f"{top + 1} to {top + len(shown)} of {len(lines)}"
-    heading = f"Traffic of {drives} drive{'' if drives == 1 else 's'}"
+    heading = counted(drives, "Traffic of 1 drive", "Traffic of {count} drives")
     return [rule(heading, width, more), *shown], top
 
 

@@ -56,10 +56,14 @@ def line_figures(view: View) -> Text:
     rate = view.snapshot.rate if view.snapshot and not view.lost else 0.0
     wished = 1 / view.period
     held = rate > HELD * wished or not rate
-    text = Text(f"{rate:.1f} of {wished:.1f} cycles/s", FAINT if held else ALARM, no_wrap=True)
-    if view.snapshot is not None and view.snapshot.block:
-        text.append(f" by {view.snapshot.block.lower()}", FAINT)
-    return text.append(" ")
+    block = view.snapshot.block.lower() if view.snapshot is not None else ""
+    cycles = figures = f"{rate:.1f} of {wished:.1f} cycles/s"
+    if block:
+        figures = f"{cycles} by {block}"
+    text = Text(f"{figures} ", FAINT, no_wrap=True)
+    if not held:
+        text.stylize(ALARM, 0, len(cycles))
+    return text
 
 
 Parts = dict[str, list[Text]]

@@ -159,7 +159,9 @@ def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]
     fault = state.fault
     code = fault.code if fault else "code not read"
     lines = [Text(short(fault.name if fault else "", width), STRONG), Text(view.fault_at, FAINT)]
-    lines.append(Text.assemble(("press ", PLAIN), ("5", KEY), (" for what to do", PLAIN)))
+    advice = Text("press 5 for what to do", PLAIN)
+    advice.highlight_words(["5"], KEY)
+    lines.append(advice)
     return Text(f" FAULT {code} ", FAULT_BLOCK), lines
 
 
@@ -207,9 +209,8 @@ def _timeout(view: View, width: int) -> tuple[str, Style]:
         return _polled(view, text, watch.timeout)
     if not watch.acts:
         return "off", FAINT
-    begins = ", starts when commanded"
-    fits = width >= STATE_LABEL_CELLS + len(text + begins)
-    return (text + begins if fits else f"{text}, off"), FAINT
+    whole = f"{text}, starts when commanded"
+    return whole if width >= STATE_LABEL_CELLS + len(whole) else f"{text}, off", FAINT
 
 
 def _polled(view: View, text: str, timeout: float) -> tuple[str, Style]:
