@@ -25,7 +25,7 @@ from textual.widgets import Label
 from tui.terminal.lean import Picture, blank_style, strips_of
 from tui.terminal.lean_app import LeanApp
 from tui.terminal.pacing import ASK, WHOLE
-from tui.widgets.lines import Lines, looks, runs
+from tui.widgets.lines import Lines, looks, piece_by_piece, runs
 
 from .bytes_per_second import compare
 
@@ -232,6 +232,13 @@ def strip_of(text: Text) -> Strip:
         for at in range(len(text.plain))
     ]
     return Strip(segments).adjust_cell_length(COLUMNS, Style())
+
+
+def test_empty_piece_repeats_nothing() -> None:
+    text = Text("│ ").append_text(Text("", COLORS[0])).append("23", COLORS[1])
+    found = piece_by_piece(text.plain, tuple(text.spans), text.style)
+    assert found is not None
+    assert "".join(segment.text for segment in found) == "│ 23"
 
 
 def _console() -> Any:

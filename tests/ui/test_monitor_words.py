@@ -11,7 +11,7 @@ from tui.drive.orders import MOVING_ORDERS
 from tui.drive.profile import library
 from tui.drive.profile.schema import Bit
 from tui.screens.command.control import Control, hindrance
-from tui.screens.monitor.assembly import NOTICE_ROWS, notice_lines
+from tui.screens.monitor.assembly import NOTICE_ROWS, framed_state, notice_lines
 from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
 from tui.screens.monitor.state import _timeout, countdown, state_lines
@@ -191,6 +191,19 @@ def test_bit_in_columns_has_its_subject() -> None:
     assert "● Reference channel" in reported
     assert "● Command channel 1" in reported
     assert "In force" not in reported
+
+
+@pytest.mark.parametrize("family", PROFILES)
+@pytest.mark.parametrize("width", [29, 34])
+def test_fault_whose_code_was_not_read_is_in_the_frame_of_the_state(
+    family: str, width: int
+) -> None:
+    view = view_of(library.load(family), {})
+    assert view.snapshot is not None
+    state = replace(view.snapshot.state, kind="fault", fault=None)
+    lines = framed_state(replace(view, snapshot=replace(view.snapshot, state=state)), width)
+    assert "FAULT code not read" in lines[0].plain
+    assert {line.cell_len for line in lines} == {width}
 
 
 @pytest.mark.parametrize("code", ["ETA", "LRS6", "UNT"])

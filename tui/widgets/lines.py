@@ -157,6 +157,7 @@ def piece_by_piece(text: str, spans: Sequence[Span], style: Style | str) -> list
             return None
         if start > at:
             found.append(Segment(text[at:start], style))
+            at = start
         if end > start:
             found.append(Segment(text[start:end], style + over))
             at = end

@@ -90,8 +90,11 @@ def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> 
 def framed_state(view: View, width: int) -> list[Text]:
     """The state with who commands, in a frame; the line's answers are in its lower edge."""
     head, *rows = state_lines(view, width - 4)
-    title = Text(" State ", FAINT)
     right = Text(" ").append_text(head).append(" ")
+    title = Text(" State ", FAINT)
+    if title.cell_len + right.cell_len > width - 2:  # the state itself is never left out
+        title = Text("")
+        right.truncate(width - 2, overflow="ellipsis")
     padded = [Text(" ").append_text(row).append(" ") for row in rows]
     return framed(title, right, padded[:3], padded[3], width)
 
