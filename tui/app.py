@@ -104,7 +104,7 @@ class DrivePanelApp(
         """Check what every screen shows, and that the line is unchanged."""
         super().look_around()
         if self.is_running:
-            self.mind_line()
+            self.check_line()
 
     def say_first(self, happened: str, next_step: str, kind: str = "") -> None:
         """Say something on Line, where a person begins."""

@@ -12,7 +12,8 @@ from .commands import run, tcp_line
 
 ELSEWHERE = {
     "Leroy-Somer at its terminals": (
-        "powerdrive", {"6.43": 0}, "6.43 is Terminals. In the panel t takes the control.",
+        "powerdrive", {"6.43": 0},
+        "6.43 is Terminals. In the panel, press t on Monitor to take control.",
     ),
     "Altivar 312 at its terminals": (
         "atv312", {"LAC": 2, "Fr1": 1}, "the active Reference channel 1 (Fr1) is Terminals.",

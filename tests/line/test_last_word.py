@@ -132,7 +132,7 @@ def leave_questions(panel: PtyPanel) -> None:
 def test_spaced_keys_on_a_hung_link_are_ignored_and_reported(panel: PtyPanel) -> None:
     before = len(panel.log.writes)
     panel.type("arrv")  # typed 2 s apart, delivered together
-    panel.shows("4 keys came together and were")
+    panel.shows("Ignored 4 keys that arrived")
     panel.settle()
     assert panel.log.writes[before:] == []
     assert not panel.armed
@@ -240,7 +240,7 @@ def test_space_after_a_key_that_leaves_a_field_stops(
 def name_of_file(panel: PtyPanel) -> None:
     """Open the question for the name of a file, in which a space is text."""
     panel.type("7")
-    panel.shows("frames, j find")
+    panel.shows("frames, j to find")
     panel.type("\x13")
     panel.shows("Save the frames")
     panel.settle(0.5)

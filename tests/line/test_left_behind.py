@@ -45,7 +45,7 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         assert made.speed > 2
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("FORWARD", "Running since", "has exited", "T takes it over")
+        terminal.wait_for("FORWARD", "Running since", "has exited", "T to take it over")
         # not armed: nothing is taken over
         terminal.press("T")
         terminal.wait_for("Not armed")
@@ -56,7 +56,7 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
         terminal.wait_for("Taken over")
         assert frames(made.simulation) == before
         terminal.press("q")
-        terminal.wait_for("A motor runs by your command")
+        terminal.wait_for("A motor is running on your command")
         terminal.answer("s")
         made.stopped()
         wait_until(lambda: not runs(terminal.client()), "the second panel ended")
@@ -71,7 +71,7 @@ def test_leaving_a_disowned_motor_asks_first(terminal_with: Start, second_termin
         terminal = again(second_terminal, made.line)
         terminal.wait_for("FORWARD", "Running since")
         terminal.press("q")
-        terminal.wait_for("Leave the panel?", "30 s after")
+        terminal.wait_for("Quit the panel?", "30 s after")
         terminal.press("Escape")
         terminal.wait_for("FORWARD")
         assert made.speed > 2
@@ -101,7 +101,7 @@ def test_motor_left_running_on_purpose_is_reported(
     with running(terminal_with) as made:
         terminal = made.terminal
         terminal.press("q")
-        terminal.wait_for("A motor runs by your command")
+        terminal.wait_for("A motor is running on your command")
         terminal.answer("l")
         made.ended()
         time.sleep(3)
@@ -219,19 +219,22 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
         """The newest message takes more lines for a while; then only the screen says it."""
         wait_until(lambda: text not in terminal.text(), f"{text} goes away")
 
-    shows("Space stops it, T takes it over.", "Open it: Space stops it")
+    shows("Press Space to stop it, T to take it over.", "Open it, then press Space")
     terminal.press("6")
     terminal.wait_for("Signal path of the selected configuration")
-    shows("Space stops it; T on Monitor takes it over.")
+    shows("Press Space to stop it, or T on Monitor to take it over.")
     terminal.press("m")
-    shows("1: Running since", "Open it: Space stops it, T takes it over.")
+    shows("Drive 1: Running since", "Open it, then press Space to stop it or T to take it over.")
     terminal.press("1")
     terminal.wait_for("no comma")
-    disappears("Open it:")
-    shows("Press Enter: then Space stops it, T takes it over.")
+    disappears("Open it,")
+    shows("Press Enter to open it, then Space to stop it or T to take it over.")
     terminal.press("q")
-    terminal.wait_for("Leave the panel?")
-    shows("Device 1, Altivar 71: runs since", "Space stops it. To take it over: Esc, then T")
+    terminal.wait_for("Quit the panel?")
+    shows(
+        "Device 1, Altivar 71: runs since",
+        "Press Space to stop it. To take it over, press Esc, then T",
+    )
     terminal.press("Space")
     wait_until(lambda: killed.simulation.drive(1).motor.frequency == 0, "Space stops it there")
     disappears(killed.clause)

@@ -117,10 +117,10 @@ def test_panel_cannot_be_suspended_and_says_so() -> None:
         panel.run()
         for key, name in (("\x1a", "Ctrl+Z"), ("\x1c", "Ctrl+\\"), ("\x03", "Ctrl+C")):
             panel.type(key)
-            panel.shows(f"{name} ends nothing here: q leaves the panel.")
+            panel.shows(f"{name} does not end the panel. Press q to quit.")
         for name in SUSPENDING:
             os.kill(panel.pid, getattr(signal, name))
-            panel.shows(f"{'Ctrl-Z' if name == 'SIGTSTP' else name} {IGNORED}", "q leaves")
+            panel.shows(f"{'Ctrl-Z' if name == 'SIGTSTP' else name} {IGNORED}", "Press q to quit")
             assert not is_suspended(panel.pid)
         before = len(panel.log.writes)
         panel.type(" ")

@@ -112,7 +112,7 @@ def test_demo_runs_over_ssh(
     terminal.press("Enter")
     terminal.wait_for("4 MACHINE", "FORWARD", "Hz")
     terminal.press("q")
-    terminal.wait_for("Leave the panel?", "Device 1, Altivar 21: on loss of communication")
+    terminal.wait_for("Quit the panel?", "Device 1, Altivar 21: on loss of communication")
     terminal.answer("y")
     pid = int((tmp_path / "pid").read_text())
     wait_until(lambda: not runs(pid), "the panel left on its key")
@@ -151,7 +151,7 @@ def test_blocked_terminal_does_not_stop_polling(
         stale = terminal.text()
         wait_until(lambda: terminal.text() != stale, "the screen goes on after the stall")
         terminal.press("q")
-        terminal.wait_for("Leave the panel?")  # its drive acts on the timeout
+        terminal.wait_for("Quit the panel?")  # its drive acts on the timeout
         time.sleep(SETTLED)
         terminal.press("y")
         wait_until(lambda: not runs(panel), "the panel left on its keys")

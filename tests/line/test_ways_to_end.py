@@ -103,7 +103,7 @@ def test_ctrl_c_does_not_end_the_panel(terminal_with: Start) -> None:
 def test_exit_key_asks_and_stops(terminal_with: Start) -> None:
     with running(terminal_with) as made:
         made.terminal.press("q")
-        made.terminal.wait_for("A motor runs by your command", "s or Enter")
+        made.terminal.wait_for("A motor is running on your command", "s or Enter")
         made.terminal.answer("s")
         made.ended()
         assert made.speed == 0

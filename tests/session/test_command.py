@@ -265,7 +265,12 @@ REFUSALS = [
     ("atv31", {"LAC": 1}, "forward", r"below L3.*set LAC to L3"),
     ("atv312", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("atv71", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
-    ("powerdrive", {"6.43": 0}, "forward", r"6\.43 is Terminals\. .*t takes the control"),
+    (
+        "powerdrive",
+        {"6.43": 0},
+        "forward",
+        r"6\.43 is Terminals\. .*press t on Monitor to take control",
+    ),
     ("atv312", {"rFC": 97}, "forward", r"the active Reference channel 2 \(Fr2\) is None"),
     ("atv71", {}, "reset", r"No fault to reset: the drive is in the state "),
     ("atv31", {}, "take-control", r"no command 'take control'"),

@@ -83,7 +83,7 @@ class Panel(App[None]):
     def only_shows(self, key: str, character: str | None) -> bool:
         return key == "f"
 
-    def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
+    def report_ignored_keys(self, count: int, *, late: bool = False) -> None:
         self.not_taken.append(count)
         self.late += late
 

@@ -86,7 +86,7 @@ async def test_slots_are_picked_moved_written_and_verified() -> None:
         await made.pilot.press("w")
         await until(made.pilot, lambda: "Write 1 slot?" in picture(made.app))
         await made.pilot.press("escape", "A", "minus")
-        await message(made, "2 slots proposed")
+        await message(made, "2 staged")
         assert made.drive().raw("NMA2") == 8604
         await made.pilot.press("w")
         await message(made, "Not armed")
@@ -103,7 +103,7 @@ async def test_slots_are_picked_moved_written_and_verified() -> None:
         await made.pilot.press("V")
         await message(made, "3 slots match direct reads")
         await press(made.pilot, "(factory)")
-        await message(made, "2 slots proposed")
+        await message(made, "2 staged")
         await made.pilot.press("u", "escape")
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
 
@@ -290,7 +290,7 @@ async def test_p_names_the_keys_that_write_the_suggestion(
         await until(made.pilot, lambda: "FORWARD" in shown(made.app, "strip"))
         await made.pilot.press("p")
         await message(
-            made, "Proposed: Monitor's cycle", "with the motor stopped", "Press u to discard it."
+            made, "Staged: Monitor's cycle", "with the motor stopped", "Press u to discard it."
         )
         assert "w to write" not in shown(made.app, "said")
         await until(made.pilot, lambda: "Stop the motor, then press w" in shown(made.app, "detail"))
@@ -311,5 +311,5 @@ async def test_p_names_the_keys_that_write_the_suggestion(
         )
         # on another screen u and w are other keys
         await made.pilot.press("3")
-        await until(made.pilot, lambda: "Proposed" in shown(made.app, "said"))
+        await until(made.pilot, lambda: "Staged" in shown(made.app, "said"))
         assert "Press" not in shown(made.app, "said")

@@ -42,7 +42,7 @@ async def test_drive_with_a_contradicting_profile_is_not_armed() -> None:
         await until(pilot, lambda: app.screen is app.connection)
         field.value = ""
         await pilot.press("s")
-        await until(pilot, lambda: "not its own" not in shown(app, "about"))
+        await until(pilot, lambda: "does not match" not in shown(app, "about"))
         drive = app.connection.found[1]
         assert drive.session is not None
         assert drive.session.profile.id == "atv71"

@@ -13,8 +13,8 @@ def test_motor_without_a_commander_is_shown_with_the_keys() -> None:
     lines = [line.plain for line in left_lines(LEFT, 80)]
     text = " ".join(line.strip() for line in lines)
     assert text.startswith(LEFT)
-    assert "Space stops it" in text
-    assert "T on Monitor takes it over" in text
+    assert "Press Space to stop it" in text
+    assert "T on Monitor to take it over" in text
     assert 1 < len(lines) <= LEFT_ROWS
     assert all(line.startswith("  ") and len(line) <= 80 for line in lines)
 

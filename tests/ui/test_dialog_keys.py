@@ -276,9 +276,9 @@ async def test_keys_of_a_dialog_are_always_visible(
 @pytest.mark.parametrize(
     ("name", "why"),
     [
-        ("", "needed"),
-        ("x" * 300, "No file can be made there"),
-        ("~nobody-of-that-name/x.toml", "no home folder of ~nobody"),
+        ("", "Enter a file name"),
+        ("x" * 300, "The file cannot be created"),
+        ("~nobody-of-that-name/x.toml", "~nobody-of-that-name has no home folder"),
         ("a\x00b", "control characters"),
     ],
 )
@@ -338,11 +338,11 @@ async def test_key_without_a_meaning_in_a_dialog_says_where_it_works(
             dialog = app.screen
             app.screen.set_focus(None)
             # in the results of a write it saves
-            save = ("S", "S works once this is closed (Esc): Save the settings")
+            save = ("S", "Press Esc to close this first, then S: Save the settings")
             for key, text in (
                 *([] if name == "Results" else [save]),
-                ("ctrl+o", "^o works once this is closed (Esc): Open a file"),
-                ("w", "w has a meaning on Parameters (3) and Scanner (4)."),
+                ("ctrl+o", "Press Esc to close this first, then ^o: Open a file"),
+                ("w", "w works on Parameters (3) and Scanner (4)."),
             ):
                 await pilot.press(key)
                 newest = app.events.newest
@@ -367,6 +367,6 @@ async def test_s_in_write_results_continues_with_saving(
         await on_monitor(app, pilot, monkeypatch)
         answers: list[object] = []
         app.push_screen(Results(replace(APPLIED, unsaved=("ACC",))), answers.append)
-        await until(pilot, lambda: "S save to EEPROM, asks" in picture(app))
+        await until(pilot, lambda: "S Save to EEPROM (asks)" in picture(app))
         await pilot.press("S")
         await until(pilot, lambda: answers == [True])

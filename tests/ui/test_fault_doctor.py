@@ -91,7 +91,7 @@ def test_input_that_caused_the_trip_fits_80_columns() -> None:
     external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
     text = reported(view(external.raw, readings=read))
-    assert "ETF    Logic input LI4 input or bit that trips it     Enter opens" in text
+    assert "ETF    Logic input LI4 input or bit that trips it      Enter open" in text
     assert "IL1R   LI3, LI4        present state of the inputs" in text
     still = reported(view(external.raw, readings=readings_of(ATV71, {"IL1R": 0}, NOW)))
     assert "IL1R   none " in still
@@ -127,14 +127,14 @@ async def test_live_value_follows_the_drive() -> None:
 async def test_key_line_stays_at_the_bottom() -> None:
     async with panel() as made:
         await made.on("5")
-        await made.until(lambda: "No fault now" in made.shown("doctor"))
+        await made.until(lambda: "No fault." in made.shown("doctor"))
         keys = made.app.screen.query_one("#keys").region
         assert keys.y == made.app.size.height - 1
 
 
 def test_drive_without_a_fault_shows_no_causes() -> None:
     text = reported(view(None, present=False))
-    assert "No fault now" in text
+    assert "No fault." in text
     assert "Probably" not in text
 
 

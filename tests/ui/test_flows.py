@@ -337,7 +337,7 @@ async def test_slow_link_shows_few_frames_but_all_when_paused() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)
         await pilot.press("7")
-        await until(pilot, lambda: "h show all" in shown(app, "frames"))
+        await until(pilot, lambda: "h for all" in shown(app, "frames"))
         assert len(shown(app, "frames").splitlines()) == 1 + FEW
         await pilot.press("h")
         await until(pilot, lambda: len(shown(app, "frames").splitlines()) == 20)

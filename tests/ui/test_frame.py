@@ -131,7 +131,7 @@ async def test_enter_opens_the_parameter_of_a_fault() -> None:
     async with panel() as made:
         made.simulation.drive(1).provoke("ObF")
         await made.on("5")
-        await made.until(lambda: "Enter opens" in made.shown("doctor"))
+        await made.until(lambda: "Enter open" in made.shown("doctor"))
         await made.pilot.press("enter")
         await made.until(lambda: isinstance(made.app.screen, ParametersScreen))
         await made.until(lambda: made.shown("detail").lstrip().startswith("DEC"))

@@ -48,14 +48,14 @@ async def test_filter_applies_while_typed_and_esc_clears_it() -> None:
     async with on_frames() as made:
         await made.until(lambda: len(listed(made)) > 8)
         await made.pilot.press("O", *"rfr")
-        await made.until(lambda: "only rfr" in made.shown("frames"))
+        await made.until(lambda: "filter: rfr" in made.shown("frames"))
         await made.until(lambda: bool(listed(made)))
         assert all("RFR" in line for line in listed(made))
         await made.pilot.press("enter")
-        await made.until(lambda: "only rfr" in made.shown("frames"))
+        await made.until(lambda: "filter: rfr" in made.shown("frames"))
         assert not made.app.screen.query_one("#wanted").display
         await made.pilot.press("escape")
-        await made.until(lambda: "only" not in made.shown("frames"))
+        await made.until(lambda: "filter" not in made.shown("frames"))
         assert isinstance(made.app.screen, FramesScreen)
         await made.pilot.press("escape")
         await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
@@ -66,7 +66,7 @@ async def test_errors_filter_shows_errors_with_their_requests() -> None:
     async with on_frames() as made:
         assert made.app.opened is not None
         await made.pilot.press("O", *"error", "enter")
-        await made.until(lambda: "only error" in made.shown("frames"))
+        await made.until(lambda: "filter: error" in made.shown("frames"))
         made.simulation.faults.rates = FaultRates(lost=1.0)
         await made.until(lambda: len(listed(made)) > 2)
         made.simulation.faults.rates = FaultRates()
@@ -79,7 +79,7 @@ async def test_find_pauses_the_list_and_continues_to_older_frames() -> None:
         screen = made.app.screen
         assert isinstance(screen, FramesScreen)
         await made.pilot.press("j", *"RFR", "enter")
-        await made.until(lambda: "(held)" in made.shown("frames"))
+        await made.until(lambda: "(paused)" in made.shown("frames"))
         first = screen._found
         assert first is not None
         await made.pilot.press("enter")
@@ -87,9 +87,9 @@ async def test_find_pauses_the_list_and_continues_to_older_frames() -> None:
         assert screen._found is not None
         assert screen._found.time < first.time
         await made.pilot.press("escape", "j", *"no such thing", "enter")
-        await made.until(lambda: "No frame fits" in made.shown("said"))
+        await made.until(lambda: "No frame matches" in made.shown("said"))
         await made.pilot.press("escape", "h")
-        await made.until(lambda: "(held)" not in made.shown("frames"))
+        await made.until(lambda: "(paused)" not in made.shown("frames"))
 
 
 @pytest.mark.sweep
@@ -97,7 +97,7 @@ async def test_scrolling_pauses_and_stops_at_the_ends() -> None:
     async with on_frames() as made:
         await made.until(lambda: len(listed(made)) > 15)
         await made.pilot.press("up")
-        await made.until(lambda: "(held)" in made.shown("frames"))
+        await made.until(lambda: "(paused)" in made.shown("frames"))
         newest = listed(made)
         for _ in range(110):
             await made.pilot.press("pageup")
@@ -124,7 +124,7 @@ async def test_shown_frames_are_saved_as_text(tmp_path: Path) -> None:
         lines = [line for line in text.splitlines() if not line.startswith("#")]
         assert lines
         assert all(line.split("\t")[3].startswith("1 ") for line in lines)
-        assert "only 1 read" in text
+        assert "filter: 1 read" in text
 
 
 async def test_counters_of_the_open_drive_are_shown_for_both_sides() -> None:
@@ -144,7 +144,7 @@ async def test_counters_of_the_open_drive_are_shown_for_both_sides() -> None:
         await made.until(lambda: "■ The drive received" in made.shown("frames"))
         await made.pilot.press("C")
         await made.until(lambda: "The drive received" not in made.shown("frames"))
-        await made.until(lambda: "Counted from now on" in made.shown("said"))
+        await made.until(lambda: "Counts restarted" in made.shown("said"))
         await made.pilot.press("tab")
         await made.until(lambda: "Frames on the line" in made.shown("frames"))
 
@@ -152,7 +152,7 @@ async def test_counters_of_the_open_drive_are_shown_for_both_sides() -> None:
 async def test_drive_counters_are_reset_only_after_confirmation() -> None:
     async with on_frames() as made:
         await made.pilot.press("Z")
-        await made.until(lambda: "Tab shows the counters first" in made.shown("said"))
+        await made.until(lambda: "Press Tab to show the counters first" in made.shown("said"))
         await made.pilot.press("tab", "tab")
         await made.until(lambda: "function 8" in made.shown("frames"))
         counters = made.simulation.drive(1).server.counters
@@ -174,7 +174,7 @@ async def test_drive_counters_are_reset_only_after_confirmation() -> None:
             if ended:
                 screen.session.arming.disarm("Disarmed: no key pressed for 60 s.")
             await made.pilot.press("y")
-            output = "Counters not reset: " if ended else "counters are reset"
+            output = "Counters not reset: " if ended else "The drive's counters were reset."
             await made.until(lambda output=output: output in made.shown("said"))  # type: ignore[misc]
             assert (counters.frames >= before) is ended
             screen.session.arming.arm()

@@ -84,7 +84,7 @@ async def test_closed_line_is_monitored_and_released() -> None:
             # there is no stop, and that is said
             assert "cannot stop here" in shown(app, "keys")
             await pilot.press("space")
-            await until(pilot, lambda: "gets no stop" in output(app))
+            await until(pilot, lambda: "No stop is sent" in output(app))
             await pilot.press("escape")
             await until(pilot, lambda: app.screen is app.connection)
             assert not app.hearing
@@ -118,7 +118,7 @@ async def test_second_key_while_opening_leaves_no_monitor_behind(
             may_open.set()
             await until(pilot, lambda: isinstance(app.screen, ListeningScreen))
             await pilot.press("H")
-            await until(pilot, lambda: "listens already" in output(app))
+            await until(pilot, lambda: "already listening" in output(app))
             await pilot.press("escape")
             await until(pilot, lambda: app.screen is app.connection)
             assert not [thread for thread in threading.enumerate() if thread.name == "listening"]
@@ -175,7 +175,7 @@ async def panel_with(
 async def test_drive_kept_alive_by_the_panel_blocks_monitoring() -> None:
     async with panel_with(DriveSpec("atv21", 1)) as (app, pilot, peer):
         await pilot.press("7", "H")
-        await until(pilot, lambda: "Not listened to, as the panel feeds drives" in output(app))
+        await until(pilot, lambda: "Not monitored: the panel keeps drives alive" in output(app))
         assert "Device 1, Altivar 21: on loss of communication it acts 3 s after" in output(app)
         requested = len(peer.requests)
         await until(pilot, lambda: len(peer.requests) > requested + 2)
@@ -235,10 +235,10 @@ def test_reasons_that_block_monitoring_are_named() -> None:
     nameless = DriveIdentity(9, "", "", "", "", None, ())
     assert why_not_hear(fleet_of(Watch(), found)) == ""
     network = fleet_of(Watch(), found, link=TcpLink("192.168.0.10"))
-    assert why_not_hear(network).startswith("Over a network")
+    assert why_not_hear(network).endswith("of this connection.")
     running = why_not_hear(fleet_of(Watch(commanded=[session]), found))
-    assert "runs by a command of this panel. Stop it first." in running
-    assert "was not read" in why_not_hear(fleet_of(Watch(not_read=[session]), found))
+    assert "this panel commands a running motor" in running
+    assert "has not been read" in why_not_hear(fleet_of(Watch(not_read=[session]), found))
     unknown = why_not_hear(fleet_of(Watch(), found, FoundDrive(nameless)))
     assert "device 9" in unknown
     assert "close the line first" in unknown

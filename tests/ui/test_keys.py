@@ -120,15 +120,15 @@ def test_letters_that_act_immediately_are_stops() -> None:
 
 
 def test_every_key_has_a_meaning_on_its_screen() -> None:
-    assert elsewhere(CONNECTION, "r").startswith("r has a meaning on Monitor (2): Run forward")
-    assert elsewhere("frames", "V").startswith("V has a meaning on Scanner (4)")
-    assert elsewhere("monitor", "asterisk", "*").startswith("* has a meaning on Parameters (3)")
-    assert elsewhere("parameters", "less_than_sign", "<").startswith("< has a meaning on Monitor")
+    assert elsewhere(CONNECTION, "r").startswith("r works on Monitor (2): Run forward")
+    assert elsewhere("frames", "V").startswith("V works on Scanner (4)")
+    assert elsewhere("monitor", "asterisk", "*").startswith("* works on Parameters (3)")
+    assert elsewhere("parameters", "less_than_sign", "<").startswith("< works on Monitor")
     # what waits to be written may be on either
-    assert elsewhere("monitor", "w") == "w has a meaning on Parameters (3) and Scanner (4)."
+    assert elsewhere("monitor", "w") == "w works on Parameters (3) and Scanner (4)."
     assert elsewhere("monitor", "r") == ""
     assert elsewhere("monitor", "Y", "Y") == ""
-    assert elsewhere("monitor", "P", "P").startswith("P has a meaning on Control (6)")
+    assert elsewhere("monitor", "P", "P").startswith("P works on Control (6)")
 
 
 def test_a_capital_letter_names_caps_lock_if_the_small_one_works_here() -> None:
@@ -195,7 +195,7 @@ async def test_key_without_a_meaning_says_where_it_works_and_does_nothing() -> N
                     made.app.connection.drives.focus()  # in a field it is text
                 made.app.events.add("told", f"{key} is next on {screen}")
                 await made.pilot.press(key)
-                reported = f"{action.shown} has a meaning on"
+                reported = f"{action.shown} works on"
                 await until(made.pilot, lambda: notices(made).startswith(reported))  # noqa: B023
                 assert list(made.app.screen_stack) == stack, (screen, key)
             assert writes(made.app, before) == [], screen
@@ -289,7 +289,7 @@ async def stage(made: Bench) -> None:
     await made.pilot.press("minus", "4")
     await until(made.pilot, lambda: "ACC" in shown(made.app, "second"))
     await made.pilot.press("delete")
-    await until(made.pilot, lambda: "proposed. Press" in shown(made.app, "detail"))
+    await until(made.pilot, lambda: "staged. Press" in shown(made.app, "detail"))
 
 
 SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}

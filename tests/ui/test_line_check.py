@@ -123,7 +123,7 @@ async def opened_unasked(line: str) -> None:
         app.look_around()
         assert isinstance(app.screen, MonitorScreen)
         await app.run_action("accept_line")
-        await until(pilot, lambda: "nothing to accept" in shown(app, "said"))
+        await until(pilot, lambda: "Nothing to accept" in shown(app, "said"))
 
 
 async def test_question_about_a_changed_line_comes_after_the_scan(simulation: Simulation) -> None:

@@ -83,10 +83,10 @@ def test_state_block_always_has_five_lines() -> None:
 @pytest.mark.parametrize(
     ("family", "raws", "way"),
     [
-        ("atv71", AT_TERMINALS, "6 opens Control."),
+        ("atv71", AT_TERMINALS, "Press 6 for Control."),
         ("atv71", NO_SUPPLY, "Switch the mains on."),
-        ("powerdrive", {"10.40": 3, "6.43": 0}, "t takes the control."),
-        ("atv31", {"LAC": 0}, "6 opens Control."),
+        ("powerdrive", {"10.40": 3, "6.43": 0}, "Press t to take control."),
+        ("atv31", {"LAC": 0}, "Press 6 for Control."),
     ],
 )
 def test_command_without_effect_names_next_step(
@@ -130,7 +130,7 @@ def test_reason_for_an_ineffective_command_is_never_cut(family: str) -> None:
             control = Control(hindrance=found)
             view = replace(view_of(profile, {}), control=control)
             shown = " ".join(line.plain.strip() for line in notice_lines(view, 80))
-            assert shown == f"No effect: {found.sentence}"
+            assert shown == f"No effect. {found.sentence}"
             assert len(notice_lines(view, 80)) <= NOTICE_ROWS
             line = RunLine("forward", "30", "Hz", 0.0, 0)
             reported = f"{found.text} {_after_esc(found.way)}".strip()

@@ -16,7 +16,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
-from tui.screens.keys.finding import BY_NAME, NOT_FOUND, WAYS, find
+from tui.screens.keys.finding import BY_NAME, MOVES, NOT_FOUND, find
 from tui.screens.keys.screens import EVERYWHERE
 from tui.screens.keys.table import ACTIONS
 from tui.screens.monitor.screen import MonitorScreen
@@ -71,7 +71,7 @@ def test_every_action_is_found_on_every_screen(screen: str) -> None:
         if action.id.startswith(NOT_FOUND):
             continue
         here = screen in action.screens
-        only_moves = action.id.startswith(WAYS)
+        only_moves = action.id.startswith(MOVES)
         query = " ".join([*BY_NAME.get(action.id, ()), *action.help.rstrip(".").split()[:3]])
         query = "".join(c if c.isalnum() or c == " " else " " for c in query)
         found = [item for item in find(query, screen) if item.action.help == action.help]

@@ -155,21 +155,19 @@ async def test_edit_messages_are_true_while_the_motor_runs() -> None:
         made.app.chosen.commander.run("forward", "20Hz")  # type: ignore[union-attr]
         await until(made.pilot, lambda: editor.state == "running")
         await find(made, "ACC")
-        promise = "Press w to write it, with the motor running."
-        await stage(made, "4", "ACC → 4.0 s: 1 staged.")
+        promise = "Press w to write it. The motor is running."
+        await stage(made, "4", "ACC → 4.0 s. 1 staged.")
         await until(made.pilot, lambda: promise in lines(made))
         # on Scanner w is for slots: the keys are named on their own screen only
         await made.pilot.press("4")
-        await until(made.pilot, lambda: "ACC → 4.0 s: 1 staged." in lines(made))
+        await until(made.pilot, lambda: "ACC → 4.0 s. 1 staged." in lines(made))
         assert "Press" not in lines(made)
         await made.pilot.press("3")
         await until(made.pilot, lambda: promise in lines(made))
         await find(made, "TFR")
-        await stage(
-            made, "70", "TFR → 70.0 Hz: 2 staged. TFR waits until the motor is at standstill."
-        )
+        await stage(made, "70", "TFR → 70.0 Hz. 2 staged. To be written only at standstill: TFR.")
         await find(made, "DEC")
-        await stage(made, "5", "DEC → 5.0 s: 3 staged. TFR waits until the motor is at standstill.")
+        await stage(made, "5", "DEC → 5.0 s. 3 staged. To be written only at standstill: TFR.")
         await made.pilot.press("W")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         follows = str(made.app.screen.query_one("#follows").render())
@@ -178,9 +176,9 @@ async def test_edit_messages_are_true_while_the_motor_runs() -> None:
         await message(made, "Wrote 1, all verified. 2 still staged: ACC, TFR")
         await until(made.pilot, lambda: "Now 5.0 s, was 3.0 s." in shown(made.app, "detail"))
         await made.pilot.press("u")
-        await message(made, "TFR is no longer staged; 1 is staged now.")
+        await message(made, "TFR is no longer staged. 1 still staged.")
         await made.pilot.press("u")
-        await message(made, "ACC is no longer staged; nothing is staged now.")
+        await message(made, "ACC is no longer staged. Nothing is staged.")
         await until(
             made.pilot, lambda: "Press u to stage the old value" in shown(made.app, "detail")
         )
@@ -214,7 +212,7 @@ async def test_simply_start_is_the_first_group_with_steps_in_order() -> None:
     async with bench("atv31") as made:
         screen = await to_parameters(made)
         lines = [line.strip() for line in shown(made.app, "groups").splitlines()]
-        assert lines[lines.index("Unsaved 0") + 1] == "Simply start"
+        assert lines[lines.index("Unsaved 0") + 1] == "Commissioning"
         while not shows_steps(screen.listed):
             await made.pilot.press("left")
         await until(made.pilot, lambda: "2 Mains standard" in shown(made.app, "table"))
@@ -322,7 +320,7 @@ async def test_backup_is_compared_staged_and_written(
         made.drive().set("HSP", 400)
         await find(made, "HSP")  # a search of before hides nothing of what differs
         await open_file(made, file)
-        await message(made, "pump.toml: 2 differences")
+        await message(made, "pump.toml: 2 can be staged")
         await until(made.pilot, lambda: "Differs 1 of 2" in shown(made.app, "status"))
         await made.pilot.press("i")
         await until(made.pilot, lambda: "2 staged" in shown(made.app, "status"))
@@ -370,9 +368,9 @@ async def test_panel_follows_a_drive_to_its_new_address() -> None:
         await arm(made.pilot)
         await made.pilot.press("w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
-        assert "new settings only" in str(made.app.screen.query_one("#follows").render())
+        assert "only at the new settings" in str(made.app.screen.query_one("#follows").render())
         await made.pilot.press("y")
-        await until(made.pilot, lambda: "Follow the drive?" in question(made))
+        await until(made.pilot, lambda: "Open the line at the drive" in question(made))
         await made.pilot.press("y")
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
         await until(made.pilot, lambda: shown(made.app, "strip").startswith(" 7 "))
@@ -476,7 +474,7 @@ async def test_files_show_their_drive_and_differences(
 
         await until(made.pilot, lambda: "..." not in lines())
         reported = {line.split()[0]: line for line in lines().splitlines() if ".toml" in line}
-        assert "1 differs" in reported["own.toml"]
+        assert "1 difference" in reported["own.toml"]
         assert "Altivar 71" in reported["alien.toml"]
         assert "other family" in reported["alien.toml"]
         assert "invalid file" in reported["none.toml"]

@@ -161,7 +161,7 @@ async def test_typed_text_does_not_answer_a_new_question() -> None:
             await pilot.press(_character_to_key(key))
         assert requested.answers == []
         assert requested.app.events.newest is not None
-        assert "A question came meanwhile" in requested.app.events.newest.text
+        assert "a question appeared as you typed" in requested.app.events.newest.text
         requested.clock.now += 1.01
         await pilot.press("y")
         await until(pilot, lambda: requested.answers == [True])
@@ -209,7 +209,7 @@ async def test_long_question_scrolls_with_its_keys_visible() -> None:
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         hint = requested.question.query_one("#hint")
-        await until(pilot, lambda: "Up, Down scroll" in str(hint.render()))
+        await until(pilot, lambda: "Up, Down Scroll" in str(hint.render()))
         await until(pilot, lambda: 0 < hint.region.bottom < 24)
         says = requested.question.query_one("#says")
         await pilot.press("down", "down")
@@ -490,7 +490,7 @@ async def test_panel_does_not_exit_during_a_question() -> None:
         await made.app.action_quit()
         await until(made.pilot, lambda: made.app.screen is not requested)
         await until(made.pilot, lambda: bool(made.app.screen.query("#question")))
-        assert "Leave the panel?" in str(made.app.screen.query_one("#question").render())
+        assert "Quit the panel?" in str(made.app.screen.query_one("#question").render())
         await made.app.action_quit()
         await made.pilot.press("q")
         await until(made.pilot, lambda: made.app.screen is requested)
@@ -521,7 +521,7 @@ async def test_enter_on_control_says_why_there_is_no_question() -> None:
         await made.pilot.press("6")
         await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))
         await until(
-            made.pilot, lambda: "Nothing: the drive is set up so" in shown(made.app, "detail")
+            made.pilot, lambda: "Nothing: this configuration is active" in shown(made.app, "detail")
         )
         await made.pilot.press("enter")
         await until(made.pilot, lambda: "Nothing to write" in shown(made.app, "said"))

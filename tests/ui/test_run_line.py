@@ -235,11 +235,11 @@ async def test_run_line_has_no_reference_if_another_source_gives_it() -> None:
     async with bench("varmeca") as made:
         await made.armed()
         await made.pilot.press("r")
-        await until(made.pilot, lambda: "the reference is given at the drive" in output(made.app))
+        await until(made.pilot, lambda: "the reference is set at the drive" in output(made.app))
         await made.pilot.press("3")
         await until(made.pilot, lambda: "RUN FORWARD" not in output(made.app))
         await made.pilot.press("f")
-        await made.message("is not known")
+        await made.message("has no known parameter")
 
 
 async def test_r_at_0_hz_asks_for_a_reference() -> None:
@@ -261,9 +261,9 @@ async def test_run_line_shows_why_it_has_no_effect_and_what_to_do() -> None:
     async with bench("atv71") as made:
         made.drive().set("FR1", 1)  # a terminal gives command and reference
         await made.armed()
-        await made.message("No effect", "not commanded by Modbus", "6 opens Control")
+        await made.message("No effect", "not commanded by Modbus", "Press 6 for Control")
         await made.pilot.press("r", "2", "0")
-        await made.message("No effect: The drive", "Esc, then 6 opens Control")
+        await made.message("No effect. The drive", "Press Esc, then 6 for Control")
         before = writes(made.app)
         await made.pilot.press("enter")
         await until(made.pilot, lambda: "Esc cancel" not in output(made.app))
@@ -276,7 +276,7 @@ async def test_key_line_shows_only_run_line_keys() -> None:
         await made.pilot.press("r")
         await until(made.pilot, lambda: shown(made.app, "keys").split() == KEYS_OF_THE_LINE)
         await made.pilot.press("escape")
-        await until(made.pilot, lambda: "leave" in shown(made.app, "keys"))
+        await until(made.pilot, lambda: "quit" in shown(made.app, "keys"))
 
 
 KEYS_OF_THE_LINE = ["Space", "STOP", "1", "Enter", "run", "Esc", "cancel"]

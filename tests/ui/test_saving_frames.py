@@ -114,7 +114,7 @@ async def test_ctrl_s_on_frames_asks_for_a_name_and_saves(tmp_path: Path) -> Non
         await to_monitor(app, pilot, 2)
         await pilot.press("7")
         await until(pilot, lambda: isinstance(app.screen, FramesScreen))
-        await until(pilot, lambda: "j find" in shown(app, "frames"))
+        await until(pilot, lambda: "j to find" in shown(app, "frames"))
         await pilot.press("ctrl+s")
         await until(pilot, lambda: isinstance(app.screen, Ask))
         assert app.screen.query_one(Input).value.endswith(".pcapng")

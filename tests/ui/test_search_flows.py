@@ -119,15 +119,15 @@ async def test_pending_timeout_is_reported_once() -> None:
         await until(pilot, lambda: app.connection.scanning)
         await pilot.press("escape")
         await until(pilot, lambda: not app.connection.scanning)
-        assert sum("Kept asking" in text for text in output(app)) == 1
+        assert sum("Kept alive" in text for text in output(app)) == 1
 
 
 async def test_drive_with_its_timeout_reaction_off_has_no_pending_timeout() -> None:
     ignoring = DriveSpec("atv31", 1, sets={"SLL": 0})
     async with panel(ignoring, DriveSpec("atv21", 2)) as (app, pilot):
-        await until(pilot, lambda: any("Kept asking" in text for text in output(app)))
-        (text,) = (text for text in output(app) if "Kept asking" in text)
-        assert "Kept asking: 2 (3 s). Otherwise they trip" in text
+        await until(pilot, lambda: any("Kept alive" in text for text in output(app)))
+        (text,) = (text for text in output(app) if "Kept alive" in text)
+        assert "Kept alive while this line is open: 2 (3 s). If polling stops, they trip" in text
         assert app.fleet is not None
         assert set(app.fleet.line_watch.pending_timeouts()) <= {2}
 
@@ -146,7 +146,7 @@ async def test_drive_with_damaged_identification_keeps_its_stop_keys() -> None:
         assert fleet.console(1) is console
         await app.connection._take(other)
         assert fleet.found[9].console is None
-        assert "It came damaged. The address is taken." in output(app)
+        assert "It came damaged. A device has this address." in output(app)
 
 
 async def test_swapped_bytes_are_shown_on_line_and_monitor() -> None:

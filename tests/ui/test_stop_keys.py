@@ -71,14 +71,14 @@ async def test_only_f12_and_f9_stop_in_every_field() -> None:
 async def test_ignored_keys_are_reported_without_markup() -> None:
     app = app_of()
     async with app.run_test() as pilot:
-        app.ignored_keys_text(3)
-        app.ignored_keys_text(1)
-        app.ignored_keys_text(2, late=True)
+        app.report_ignored_keys(3)
+        app.report_ignored_keys(1)
+        app.report_ignored_keys(2, late=True)
         await pilot.pause()
         assert [event.text for event in app.events.events] == [
-            "3 keys came together and were ignored.",
-            "A key was ignored: it did not come alone.",
-            "2 keys came too late and were ignored.",
+            "Ignored 3 keys that arrived together.",
+            "Ignored a key that did not arrive alone.",
+            "Ignored 2 keys that arrived too late.",
         ]
         assert not app._notifications, "a toast is for a motor that does not stop"
 

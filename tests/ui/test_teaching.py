@@ -60,7 +60,7 @@ async def test_two_readings_set_the_scale_and_a_disagreeing_third_discards_it() 
         assert "Current ?" in shown(app, "readouts"), "it was not taught"
         made.drive().set("5.01", 400)
         await pick(made, "5.01")
-        assert "Taught: 1 count is 0.1 Hz" in str(app.screen.query_one("#about").render())
+        assert "Learned scale: 1 count is 0.1 Hz" in str(app.screen.query_one("#about").render())
         await look(made, "20.0")
         await made.message("shown raw again")
         await until(pilot, lambda: "Output ?" in shown(app, "readouts"))
@@ -106,7 +106,8 @@ async def test_enter_or_l_on_a_raw_value_asks_for_the_display_value() -> None:
             await until(pilot, lambda: isinstance(app.screen, Ask))
             await look(made, text)
         await until(
-            pilot, lambda: "Taught: 1 count is 0.1 A" in " ".join(shown(app, "detail").split())
+            pilot,
+            lambda: "Learned scale: 1 count is 0.1 A" in " ".join(shown(app, "detail").split()),
         )
         await until(pilot, lambda: "12.0 A" in shown(app, "table"))
 
@@ -154,13 +155,13 @@ async def test_learned_preset_is_suggested_confirmed_and_used_to_run() -> None:
         await made.stopped()
         assert made.drive().raw("6.42") & 0x002E == 0
         await made.answer("R", "y")
-        await made.message("takes the reference no longer")
+        await made.message("no longer sets the reference")
 
 
 async def test_family_with_a_reference_has_no_preset_to_learn() -> None:
     async with bench("atv71") as made:
         await made.pilot.press("R")
-        await made.message("no reference that has to be taught")
+        await made.message("needs no learned scale for its reference")
         await made.pilot.press("L")
-        await made.message("Nothing here is shown raw")
+        await made.message("No value here needs a learned scale")
         assert not made.app.screen.query(Input)

@@ -68,7 +68,7 @@ def open_panel(
     )
 
     def tell(text: str) -> None:
-        soon_in_loop(app, app.tell, f"{text} q leaves the panel.")
+        soon_in_loop(app, app.tell, f"{text} Press q to quit.")
 
     _come_to_the_front()
     with never_suspended(tell), ending_by_signal(app, stop=on_hangup == STOP) as came:

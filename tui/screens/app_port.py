@@ -26,16 +26,16 @@ if TYPE_CHECKING:
 
 
 class Panel(LeanApp):
-    """The app as its screens see it: the lines that are open, one of them shown, their drives."""
+    """The app as its screens see it: open lines, the line that is shown, their drives."""
 
     clock: Clock
     read_only: bool
     low_bandwidth: bool
-    """True if the terminal is to be sent as little as possible."""
+    """True if as little as possible is to be sent to the terminal."""
     leave_running: bool
-    """True if motors started from here are meant to go on when the panel is lost."""
+    """True if motors started by this panel keep running when its terminal is lost."""
     period: float
-    """Wished time of a monitoring cycle in seconds, the same for every drive."""
+    """Intended time of a monitoring cycle in seconds, the same for every drive."""
     opened: OpenLine | None
     """The line that is shown."""
     fleet: Fleet | None
@@ -43,36 +43,36 @@ class Panel(LeanApp):
     panel_lines: tuple[PanelLine, ...]
     """All lines that are open."""
     events: EventLog
-    """Everything that was said."""
+    """All messages."""
     opening: LineOpening
-    """The line that is being opened, if one is: then only stops, Esc and help mean something."""
+    """The line that is being opened, if any; until it is open only stops, Esc and help work."""
     key_hint: tuple[Event | None, str, str] = (None, "", "")
     """Keys shown after a message: the message, the screen on which they work, the sentence."""
     hearing: str = ""
-    """The line that is listened to, as it was typed: nothing is sent there, no stop either."""
+    """The monitored line as it was typed; nothing is sent on it, not even a stop."""
     drive_documents: Callable[[], DriveDocuments]
     """JSON documents of drives; imported when needed."""
     unreached: tuple[str, float]
-    """The last text about drives that a stop of all does not reach, and its monotonic time."""
+    """The last text about drives that a stop of all did not reach, and its monotonic time."""
     chosen: DriveConsole | None
-    """The drive that was opened last on the open line; the stop key means it."""
+    """The open drive: the one opened last on the line that is shown. The stop key stops it."""
 
     @property
     @abstractmethod
     def stroke(self) -> Stroke | None:
-        """Facts about the key that has its effect now; None if there is none."""
+        """The stroke of the key that is taking effect now; None if there is none."""
 
     @abstractmethod
     def stop_stamp(self) -> object:
-        """Another object after every stop."""
+        """Return a value that changes with every stop."""
 
     @abstractmethod
     def follow(self, line: str, device: int) -> None:
-        """Open the line again as a drive now wants it, and watch that drive."""
+        """Open the line again with a drive's new settings, and show that drive."""
 
     @abstractmethod
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
-        """Stop one drive, in its own way."""
+        """Stop one drive by this kind of stop."""
 
     def notify(
         self,
@@ -83,13 +83,13 @@ class Panel(LeanApp):
         timeout: float | None = None,
         markup: bool = False,
     ) -> None:
-        """Say something in the line of messages, where the newest replaces the one before."""
+        """Show a message in the message line, where the newest replaces the one before."""
         kinds = {"information": "told", "warning": "alarm", "error": "failed"}
         self.events.add(kinds[severity], f"{title} {message}".strip())
 
     def action_help_quit(self) -> None:
-        """Ctrl+C ends nothing here."""
-        self.tell("Ctrl+C ends nothing here: q leaves the panel.")
+        """Report that Ctrl+C does not end the panel."""
+        self.tell("Ctrl+C does not end the panel. Press q to quit.")
 
     @property
     def line_text(self) -> str:

@@ -1,4 +1,4 @@
-"""Common parts of the screens: regular refresh, lines in their places, the keys."""
+"""Common parts of the screens: regular refresh, lines in their places, the key bar."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .keys.table import elsewhere, keys_line, opening_line, typing_line
 
 
 class PanelScreen(Framed):
-    """A screen made of lines within the frame, the last of which names its keys.
+    """A screen made of lines within the frame; the last line is the key bar.
 
     Textual calls the `on_...` methods of a class and then those of its bases.
     """
@@ -32,12 +32,12 @@ class PanelScreen(Framed):
     PanelScreen #keys { dock: bottom; height: 1; margin-top: 1; background: $surface; }
     """
     LOOK: ClassVar[float | None] = None
-    """Seconds between two looks at what there is; None for a screen with a time of its own."""
+    """Seconds between two refreshes; None if the screen refreshes at its own times."""
 
     def compose(self) -> ComposeResult:
-        """The frame, what the screen itself shows, and its keys."""
+        """The frame, the body of the screen, and the key bar."""
         yield from self.framed()
-        yield Lines(id="frame-room")  # the place of strip and tabs
+        yield Lines(id="frame-room")  # room for status bar and tabs
         yield from self.body()
         yield Lines(id="keys", fit=self.keys_now)
 
@@ -46,45 +46,45 @@ class PanelScreen(Framed):
         raise NotImplementedError
 
     def on_mount(self) -> None:
-        """Look now and then."""
+        """Start the regular refresh."""
         if self.LOOK is not None:
             self.set_interval(SELDOM if self.app.low_bandwidth else self.LOOK, self.look)
 
     def on_resize(self, event: Resize) -> None:
-        """More room, more lines."""
+        """Refresh for the new size."""
         self.call_after_refresh(self.look)
 
     def put(self, place: str, lines: Sequence[Text]) -> None:
-        """Show lines in the place with that id; what does not fit ends with an ellipsis."""
+        """Show lines in the place with that id; a line that is too long ends with an ellipsis."""
         found = self.query_one(f"#{place}", Lines)
         found.show([_fitted(line, found.size.width) for line in lines])
 
     def put_all(self, place: str, lines: Sequence[Text]) -> None:
-        """The same in a place that is given as many rows as there are lines."""
+        """The same, and give the place as many rows as there are lines."""
         found = self.query_one(f"#{place}", Lines)
         if found.size.height != len(lines):
             found.styles.height = len(lines)
         self.put(place, lines)
 
     def look(self) -> None:
-        """Show what there is now; lines that stay the same are not drawn."""
-        # when the panel ends the parts of a screen go one by one, and timers still tick
+        """Show the present contents; unchanged lines are not drawn."""
+        # when the panel ends, a screen's parts are removed one by one while timers still run
         if self.is_current and self.app.is_running and not self.is_too_small:
             self.draw(self.size.width)
 
     def draw(self, width: int) -> None:
-        """Put every line, here that of the keys; the screen is on top and large enough."""
+        """Put every line, here the key bar; called while the screen is on top and large enough."""
         self.put("keys", self.keys_now(width))
 
     def draw_stop_keys(self) -> None:
-        """The line of keys names them, and which keys mean something beside them."""
-        for found in self.query("#keys").results(Lines):  # none while the screen is made, or goes
+        """Update the stop keys, and so the whole key bar."""
+        for found in self.query("#keys").results(Lines):  # none during composition or removal
             width = found.size.width
             if width and self.is_current and not self.is_too_small:
                 found.show([_fitted(line, width) for line in self.keys_now(width)])
 
     def keys_now(self, width: int) -> list[Text]:
-        """The line of keys as it is now."""
+        """The key bar of the screen, of a text field, or during the opening of a line."""
         target, field = self.app.stop_target_text, self.focused
         if self.app.opening.goes_on:
             keys = opening_line(width, target)
@@ -100,11 +100,11 @@ class PanelScreen(Framed):
 
     @property
     def name_of_screen(self) -> str:
-        """The screen as the table of actions calls it."""
+        """The screen's name in the table of actions."""
         return (self.TITLE or "").lower()
 
     def on_key(self, event: Key) -> None:
-        """A key that means nothing here says where it does, and does nothing."""
+        """Report where a key works that this screen does not use."""
         if event.key in self.active_bindings or isinstance(self.focused, Input):
             return
         if message := elsewhere(self.name_of_screen, event.key, event.character):
@@ -115,12 +115,12 @@ class PanelScreen(Framed):
         self.app.key_hint = (self.app.events.newest, self.name_of_screen, keys)
 
     def action_leave(self) -> None:
-        """Back to the screen below."""
+        """Return to the screen below."""
         self.app.pop_screen()
 
 
 def _fitted(line: Text, width: int) -> Text:
-    """The line itself, or its beginning where the place is narrower; 0 is not laid out yet."""
+    """The line, or its beginning if the place is narrower; width 0 means not laid out yet."""
     if not 0 < width < line.cell_len:
         return line
     line = line.copy()

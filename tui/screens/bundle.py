@@ -84,7 +84,7 @@ class BundleScreen(Framed, ModalScreen[None]):
             yield Plain(COLLECTING_KEYS, id="hint")
 
     def on_mount(self) -> None:
-        """Begin."""
+        """Start collecting."""
         self._show()
         self._work = self.run_worker(self._collect(), group="bundle", exit_on_error=False)
 
@@ -101,7 +101,7 @@ class BundleScreen(Framed, ModalScreen[None]):
         self.dismiss(None)
 
     def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
-        """Report an unexpected error; it ends the bundle, and not the panel."""
+        """Report an unexpected error; it ends the bundle, but not the panel."""
         if event.state is WorkerState.ERROR:
             log.error("making a bundle failed", exc_info=event.worker.error)
             self.app.events.add("error", f"The bundle failed: {event.worker.error}")
@@ -148,7 +148,7 @@ class BundleScreen(Framed, ModalScreen[None]):
 
 
 def result_lines(bundle: Bundle, path: Path, width: int) -> Iterator[Text]:
-    """The place of the file, what it lacks, and what to do next."""
+    """The path of the file, its missing parts with their reasons, and what to do next."""
     yield from _sentence(f"Saved {len(bundle.files)} files in", width, PLAIN)
     yield from _sentence(str(path), width, STRONG)
     if bundle.missing:
@@ -157,7 +157,7 @@ def result_lines(bundle: Bundle, path: Path, width: int) -> Iterator[Text]:
     for name, why in bundle.missing.items():
         yield from _sentence(f"{name}: {why}", width, PLAIN)
     yield Text("")
-    last = "README.txt in it explains each file. Check it before you send it."
+    last = "Its README.txt explains each file. Check the contents before you send it."
     yield from _sentence(last, width, FAINT)
 
 
@@ -173,7 +173,7 @@ ABOUT_BUNDLE = (
 
 
 def ask_bundle(app: Panel) -> None:
-    """Ask for the name of the file; then collect what goes into it."""
+    """Ask for the name of the file, then collect its contents."""
     find_target = getattr(app.screen, "why_target_now", None)
     target = find_target() if find_target is not None else None
     opened = target.opened if target is not None else app.opened

@@ -19,7 +19,7 @@ from tui.widgets.palette import FAINT, KEY, PLAIN
 from tui.widgets.plain import Plain, entry
 
 from .base import PanelScreen
-from .dialogs.question import Question, hint
+from .dialogs.question import Question, hint, matches_text
 
 if TYPE_CHECKING:
     from .app_port import Panel
@@ -59,9 +59,9 @@ def _action_line(found: FoundAction, name: str, keys: int) -> Text:
 
 
 class Palette(Question[FoundAction | None]):
-    """Gives the chosen action back, or None.
+    """Answers with the chosen action, or None.
 
-    Nothing is selected at first: only what begins with each word that was typed.
+    Nothing is selected until typed words begin words of an action.
     """
 
     BINDINGS: ClassVar = [
@@ -75,7 +75,7 @@ class Palette(Question[FoundAction | None]):
         self._found: list[FoundAction] = []
 
     def dialog(self) -> ComposeResult:
-        """A field, and what fits what is typed there."""
+        """A field, and the actions that match the typed text."""
         with Vertical(id="dialog"):
             yield Plain("Find an action", id="question")
             yield WordField(
@@ -91,7 +91,7 @@ class Palette(Question[FoundAction | None]):
         self._list("")
 
     def on_input_changed(self) -> None:
-        """Less, as more is typed."""
+        """List the matching actions."""
         self._list(self.query_one(WordField).words)
 
     def _list(self, query: str) -> None:
@@ -102,10 +102,7 @@ class Palette(Question[FoundAction | None]):
         options.add_options([entry(line) for line in action_lines(self._found, width)])
         ready = bool(self._found) and self._found[0].ready
         options.highlighted = 0 if ready else None
-        count = "No match. Delete some letters."
-        if self._found:
-            many = len(self._found)
-            count = f"{many} match" if many == 1 else f"{many} matches" if query else MORE
+        count = matches_text(len(self._found)) if query or not self._found else MORE
         self.query_one("#count", Plain).update(count)
         self._tell_keys()
 
@@ -118,7 +115,7 @@ class Palette(Question[FoundAction | None]):
         self._tell_keys()
 
     def action_step(self, step: int) -> None:
-        """Another one of the list; the first step chooses the first."""
+        """Move the cursor in the list; the first step selects the first action."""
         options = self.query_one(OptionList)
         if not options.option_count:
             return
@@ -130,29 +127,29 @@ class Palette(Question[FoundAction | None]):
     def _tell_keys(self) -> None:
         """Show the effect of Enter."""
         at = self.query_one(OptionList).highlighted
-        keys = [("Up, Down", "choose")] if self._found else []
+        keys = [("Up, Down", "Choose")] if self._found else []
         keys.append(JOINS_KEY)
         if at is not None:
             found = self._found[at]
-            keys.append(("Enter", "run" if found.here else f"go to {found.screen.capitalize()}"))
-        self.tell_keys(hint(*keys, ("Esc", "cancel")))
+            keys.append(("Enter", "Run" if found.here else f"Go to {found.screen.capitalize()}"))
+        self.tell_keys(hint(*keys, ("Esc", "Cancel")))
 
     def on_input_submitted(self) -> None:
-        """Take the one that is marked; where none is, nothing is chosen."""
+        """Answer with the selected action, if any."""
         at = self.query_one(OptionList).highlighted
         if at is not None:
             self.answer(self._found[at])
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Take the one that was clicked."""
+        """Answer with the clicked action."""
         self.answer(self._found[event.option_index])
 
 
 def open_palette(app: Panel) -> None:
-    """Ask for an action, and do it; one of another screen is shown where it lives."""
+    """Ask for an action and run it; for an action of another screen, go to that screen."""
     below = app.screen
     if not isinstance(below, PanelScreen):
-        return  # a question, or the help: it ends by its own keys
+        return  # a question or the help is open
 
     def chosen(found: FoundAction | None) -> None:
         if found is None or app.screen is not below:
@@ -161,7 +158,7 @@ def open_palette(app: Panel) -> None:
             app.call_later(app.run_action, found.action.id, app if found.action.app else below)
         else:
             app.action_goto(found.screen)
-            key = found.action.shown or "^p"  # what has no key is chosen there once more
-            app.tell(f"{found.name}: {key} on {found.screen.capitalize()}.")
+            key = found.action.shown or "^p"  # without a key, it is chosen again from there
+            app.tell(f"Press {key} on {found.screen.capitalize()}: {found.action.help}")
 
     app.push_screen(Palette(app.place), chosen)

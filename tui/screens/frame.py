@@ -1,6 +1,6 @@
 """Frame around every screen and over every dialog: status bar, tabs, the newest message.
 
-It is live everywhere: a person who answers a question sees what the motor does.
+It is live everywhere: a person who answers a question sees the state of the motor.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from textual.screen import Screen
 from textual.widget import Widget
 
 from tui.drive.plain import plain
+from tui.session.command.stop_report import NOT_STOPPED
 from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.names import STOP_KEYS
 from tui.widgets.drawing import key_line, wrapped
@@ -33,6 +34,8 @@ from .keys.screens import TABBED
 from .keys.table import once_closed, stop_keys
 
 if TYPE_CHECKING:
+    from tui.session.events import Event
+
     from .app_port import Panel
 
 TABS = tuple(Tab(tab.name, tab.digit, tab.title, tab.narrow) for tab in TABBED)
@@ -47,23 +50,23 @@ MESSAGE_KIND_STYLES: dict[str, Style] = {
     "done": PLAIN,
 }
 SELDOM = 2.0
-"""Seconds between two looks on a slow link; state, stop and fault are shown at once."""
+"""Seconds between two updates on a slow link; state, stop and fault are shown immediately."""
 WHOLE_KINDS = frozenset({"fault", "failed", "error", "refused", "alarm", "told", "done"})
-"""Kinds of a message that is shown whole for a while, on more lines where it takes them."""
+"""Kinds of messages that are first shown in full, on several lines if necessary."""
 WHOLE_FOR = 15.0
-"""Seconds for which such a message takes more lines than its own."""
+"""Seconds for which such a message may take more than one line."""
 WHOLE_LINES = 6
 NOT_STOPPED_HEAD = "NOT STOPPED"
-"""Head of a message about a motor that a stop did not stop: it stays whole until the next one."""
+"""Beginning of a message about a motor that did not stop; it is shown in full until the next."""
 NOT_STOPPED_LINES = 6
-"""Rows of the motors that a stop does not stop; more are named in one sentence."""
+"""Rows for motors that did not stop; more are counted in one sentence."""
 NOT_STOPPED_MANY = "NOT STOPPED: {} drives. Stop them at the machine. Press m for the reasons."
 DIALOG_KEYS = "dialog-keys"
-"""The place of the stop keys of a dialog: over the line of keys of the screen below."""
+"""Id of the stop keys of a dialog; they cover the key bar of the screen below."""
 
 
 class Framed(Screen[Any]):
-    """A screen, or a dialog over one, with the frame around it; the app draws it now and then."""
+    """A screen, or a dialog over one, with the frame around it; the app redraws the frame."""
 
     app: Panel
     _frame_parts: Mapping[str, Lines] = MappingProxyType({})
@@ -80,19 +83,19 @@ class Framed(Screen[Any]):
     """
 
     def framed(self) -> Iterable[Widget]:
-        """The parts of the frame as it is now: the first picture has them, too."""
+        """The parts of the frame with their present contents, for the first picture."""
         view, width = self.app.frame_now(), self.app.size.width
         parts = self._parts(view, width)
         self._frame_parts = {place: Lines(id=place) for place in parts}
         for place, part in self._frame_parts.items():
             part.show(parts[place])
             if place == "said":
-                part.styles.height = len(parts[place])  # the first picture cuts nothing off
+                part.styles.height = len(parts[place])  # so that the first picture is complete
             yield part
 
     def _parts(self, view: FrameView, width: int) -> dict[str, list[Text]]:
         here = (self.TITLE or "").lower() or view.place
-        here = FRAMES if here == LISTENING else here  # a mode of it
+        here = FRAMES if here == LISTENING else here  # Listening is a mode of Frames
         lead = not self.takes_letters
         news = view.message is not None or not view.not_stopped
         parts = {
@@ -110,17 +113,17 @@ class Framed(Screen[Any]):
 
     @property
     def is_too_small(self) -> bool:
-        """True if the terminal has room for the sentence that says so, and for nothing else."""
+        """True if the terminal is too small for the screen."""
         return is_too_small(*self.app.size)
 
     def on_resize(self, event: Resize) -> None:
-        """Say at once that the terminal is too small, or no longer."""
+        """Show immediately if the terminal is too small now."""
         if self.is_current and self.app.is_running:
             self.draw_frame(self.app.frame_now())
 
     @property
     def takes_letters(self) -> bool:
-        """True if digits and letters are not those of the panel now: a dialog, or a text."""
+        """True if digits and letters do not act as keys of the panel: in a dialog or a field."""
         return self.is_modal or takes_text(self.focused)
 
     def watch_focused(self) -> None:
@@ -134,11 +137,11 @@ class Framed(Screen[Any]):
             self.draw_frame(self.app.frame_now())
 
     def on_screen_resume(self, event: ScreenResume) -> None:
-        """Hide values that were frozen below another screen for a moment."""
+        """Refresh the frame, which was frozen while another screen was on top."""
         self.draw_frame(self.app.frame_now())
 
     def on_key(self, event: Key) -> None:
-        """Report where a key works that means nothing to a dialog, and do nothing."""
+        """Report where a key works that a dialog does not use."""
         typed = takes_text(self.focused) and event.is_printable
         known = event.key in STOP_KEYS or event.key in self.active_bindings
         if not self.is_modal or typed or known:
@@ -147,31 +150,31 @@ class Framed(Screen[Any]):
             self.app.tell(text)
 
     def draw_frame(self, view: FrameView) -> None:
-        """Put the frame as it is now; what stays the same is not drawn."""
+        """Show the frame's present contents; unchanged parts are not drawn."""
         if not self.size.width:
             return
         self._draw_small(view)
         if self.is_too_small:
             return
         parts = self._parts(view, self.size.width)
-        # kept by hand: to look for them costs more than to draw them
+        # kept in a mapping: a query costs more than drawing them
         for place, lines in parts.items():
             part = self._frame_parts.get(place)
             if part is None or not part.is_attached:
-                continue  # a screen that is being made, or goes
+                continue  # the screen is being composed or removed
             if place == "said" and self.message_rows != len(lines):
                 part.styles.height = len(lines)
             part.show(lines)
 
     @property
     def message_rows(self) -> int:
-        """Rows of the message."""
+        """Rows of the message area."""
         part = self._frame_parts.get("said")
         height = part.styles.height if part is not None else None
         return int(height.value) if height is not None else 1
 
     def _draw_small(self, view: FrameView) -> None:
-        """Cover the screen where the terminal is too small for it."""
+        """Cover the screen if the terminal is too small for it."""
         if not self.is_too_small:
             if self._small is not None:
                 self._small.remove()
@@ -179,14 +182,14 @@ class Framed(Screen[Any]):
             return
         if self._small is None:
             if not any(part.is_attached for part in self._frame_parts.values()):
-                return  # the frame would come over it
+                return  # the frame, mounted later, would cover it
             self._small = Lines(id="small")
             self.mount(self._small)
         self._small.show(small_lines(view.strip, self.app.stop_target_text, *self.size))
 
 
 def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
-    """Motors that a stop does not stop: each text whole, or all in one sentence if many."""
+    """Motors that did not stop: each text in full, or one sentence if there are many."""
     room = max(10, width - 2)
     parts = [part for text in texts for part in wrapped(text, room, NOT_STOPPED_LINES)]
     if len(parts) > NOT_STOPPED_LINES:
@@ -195,9 +198,9 @@ def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
 
 
 def message_lines(message: BarMessage | None, width: int, *, lead: bool = True) -> list[Text]:
-    """The message; one that is new has as many lines as it takes, up to `WHOLE_LINES`.
+    """The message; a new one takes several lines if necessary, up to `WHOLE_LINES`.
 
-    `lead` says whether the keys that show more lead there now.
+    With `lead`, the line names the key that shows more.
     """
     if message is None:
         return [Text("")]
@@ -217,8 +220,19 @@ def message_lines(message: BarMessage | None, width: int, *, lead: bool = True) 
         return lines
     hint = "m messages" if width >= 60 and lead else ""
     if lead and message.there and message.kind == "fault" and width >= 72:
-        hint = "[ ] go there"
+        hint = "[ ] other drives"
     return [message_line(message.when, message.text, style, hint, width)]
+
+
+def with_drive(event: Event) -> str:
+    """The text of an event, with its drive."""
+    if event.device is None:
+        return event.text
+    if event.kind == "fault":
+        return f"Drive {event.device} {event.text}"
+    if event.text.startswith(NOT_STOPPED):
+        return f"{NOT_STOPPED_HEAD}, drive {event.device}: {event.text.removeprefix(NOT_STOPPED)}"
+    return f"Drive {event.device}: {event.text}"
 
 
 def at(wall: float) -> str:

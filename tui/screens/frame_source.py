@@ -15,7 +15,7 @@ from tui.session.command.stop_report import NOT_STOPPED
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT
 from tui.widgets.strip import BarMessage, DriveNow, FrameView, StripView
 
-from .frame import at
+from .frame import at, with_drive
 from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
 
 if TYPE_CHECKING:
@@ -32,11 +32,11 @@ if TYPE_CHECKING:
     from .app_port import Panel
 
 FAILED_SHOWN = 60.0
-"""Seconds for which a failed stop is shown over everything, unless its motor is at rest."""
+"""Seconds for which a failed stop is shown over everything, unless its motor is at standstill."""
 
 
 def not_stopped_texts(app: Panel, now: float) -> tuple[str, ...]:
-    """A text for each motor that a stop does not stop."""
+    """A text for each motor that did not stop."""
     labels = {id(item.fleet): f"{item.opened.label}, " for item in app.panel_lines}
     found = []
     for fleet in app.fleets:
@@ -53,34 +53,42 @@ def not_stopped_texts(app: Panel, now: float) -> tuple[str, ...]:
 
 
 def is_not_stopped(report: StopReport, session: DriveSession, now: float) -> bool:
-    """True if, as far as is known, the motor of a stop has not stopped yet."""
+    """True if, as far as known, the motor has not stopped since the stop."""
     if report.phase.value == "unheeded":
         return True
     if report.phase.value != "failed" or now - report.since > FAILED_SHOWN:
         return False
     outcome = session.work.outcome
     newer = outcome is not None and outcome.kind == "done" and outcome.time > report.since
-    # by a guessed family no motor is seen at rest
+    # with an assumed profile, standstill cannot be confirmed
     return not newer and (session.guessed or session.rest_seen <= report.since)
 
 
 def repeats(message: str, texts: Iterable[str]) -> bool:
-    """True if a message repeats what is shown of a stop over everything."""
-    _, head, why = message.partition(NOT_STOPPED)
-    return bool(head) and any(text.endswith(why) for text in texts)
+    """True if a message repeats a text about a motor that did not stop."""
+    head, _, why = message.partition(": ")
+    return head.startswith("NOT STOPPED") and any(text.endswith(why) for text in texts)
 
 
 LOAD_OVER = 2.0
 """Seconds over which the load of the line is measured."""
 STOP_SHOWN = 10.0
-"""Seconds for which a failed stop replaces the state, though that is known."""
+"""Seconds for which a failed stop replaces the state, even if the state is known."""
 STOP_WORDS = {"sending": "STOP WAITS", "stopping": "STOPPING"}
-"""A stop on its way: its frame waits for the line, or was sent."""
+"""Texts of a stop in progress: its frame waits for the line, or was sent."""
+NO_ANSWER_YET = (
+    "Drive {device}: NO ANSWER for {silent:.1f} s. Its communication timeout ends in {left:.1f} s:"
+    " {does}."
+)
+NO_ANSWER_OVERDUE = (
+    "Drive {device}: NO ANSWER for {silent:.1f} s. Its communication timeout has ended: {does}."
+)
+UNKNOWN_REACTION = "its reaction is not known"
 DIRECTION_WORDS = {"forward": "FORWARD", "reverse": "REVERSE"}
 
 
 class FrameSource:
-    """Makes the frame's view of the moment; belongs to the panel's loop."""
+    """Makes the frame's present contents; used in the panel's loop only."""
 
     def __init__(self, app: Panel) -> None:
         self._app = app
@@ -90,7 +98,7 @@ class FrameSource:
         self._load: float | None = None
 
     def view(self) -> FrameView:
-        """All that the frame shows now."""
+        """Present contents of the frame."""
         app, fleet = self._app, self._app.fleet
         now = app.clock.monotonic()
         console = app.chosen if fleet is not None and app.chosen in fleet.consoles else None
@@ -131,7 +139,7 @@ class FrameSource:
         return " · ".join(parts)
 
     def _measured(self, now: float) -> float | None:
-        """Share of the last seconds in which the line was busy."""
+        """Share of the last `LOAD_OVER` seconds in which the line was busy, or None."""
         opened = self._app.opened
         if opened is None:
             self._busy = self._load = None
@@ -160,12 +168,10 @@ class FrameSource:
             return None
         opened = console.device if console is not None else None
         there = event.device is not None and event.device != opened
-        text = f"drive {event.device}: {event.text}" if there else event.text
-        if there and event.kind == "fault":
-            text = f"drive {event.device} {event.text}"
+        text = with_drive(event) if there else event.text
         message, place, keys = self._app.key_hint
         if message is event and place == self._app.place:
-            text = f"{text} {keys}".strip()  # on another screen they may mean something else
+            text = f"{text} {keys}".strip()  # only here: keys differ between screens
         return BarMessage(at(event.wall), text, event.kind, time.time() - event.wall, there)
 
     def _event(self) -> Event | None:
@@ -183,7 +189,7 @@ class FrameSource:
         return next(before, None)
 
     def _trouble_below(self, now: float) -> str:
-        """The first trouble of the lines that are open and not shown."""
+        """The first trouble of the open lines that are not shown; empty if none."""
         for line in self._app.panel_lines:
             if line.opened is not self._app.opened and (
                 trouble := self._line_trouble(now, line.opened) or self._not_heard(line.fleet)
@@ -213,12 +219,9 @@ class FrameSource:
             return ""
         first = min(warnings, key=lambda warning: warning.left)
         reaction = first.watch.reaction
-        does = f": {reaction.name.lower()}" if reaction else ""
-        when = f"in {first.left:.1f} s" if first.left > 0 else "by now"
-        return (
-            f"Drive {first.device}: NO ANSWER for {first.silent:.1f} s. It reacts to its"
-            f" communication timeout {when}{does}."
-        )
+        does = reaction.name.lower() if reaction else UNKNOWN_REACTION
+        text = NO_ANSWER_YET if first.left > 0 else NO_ANSWER_OVERDUE
+        return text.format(device=first.device, silent=first.silent, left=first.left, does=does)
 
 
 REPLY_KINDS = frozenset({"told", "refused"})
@@ -231,7 +234,7 @@ def _is_reply(event: Event) -> bool:
 
 
 def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
-    """The open drive as it was last seen, by its monitor or by the line's look at it."""
+    """The open drive as last read, by its monitor or by the line watch."""
     session, identity = console.session, console.identity
     model = (identity.reference if identity else "") or session.profile.name
     snapshot, look = console.latest, fleet.line_watch.looks.get(session.device)
@@ -270,7 +273,7 @@ def _family(model: str, profile: str) -> str:
 def _seen(
     console: DriveConsole, look: Look | None, now: float
 ) -> tuple[DriveState | None, float | None, Mapping[str, Shown]]:
-    """State, age where it is not the present, and readings of what was seen last."""
+    """Last state, its age in seconds if it is not current, and last readings."""
     snapshot = console.latest
     if look is not None:
         age = max(0.0, now - look.time)
@@ -290,7 +293,7 @@ def state_cell(
     now: float,
     readings: Mapping[str, Shown],
 ) -> tuple[str, str]:
-    """The kind of the state and its words, a stop on its way before it."""
+    """Kind and text of the state; a stop in progress takes precedence."""
     if report is not None:
         if report.phase.value in STOP_WORDS:
             return "stop", STOP_WORDS[report.phase.value]
@@ -306,7 +309,7 @@ def state_cell(
     if stands_by(console, state):
         return "ready", "STANDBY"
     if state.kind == "stopping" and _is_at_zero(console, readings):
-        return "stopped", "STOPPED"  # some keep the state of their quick stop at rest
+        return "stopped", "STOPPED"  # some drives keep the quick stop state at standstill
     return state.kind, state.headline.upper() or "UNKNOWN"
 
 
@@ -331,14 +334,14 @@ def stands_by(console: DriveConsole, state: DriveState) -> bool:
 def value_cell(
     console: DriveConsole, readings: Mapping[str, Shown], quantity: str
 ) -> tuple[str, str]:
-    """Text and unit of a quantity that was read; empty where it was not."""
+    """Text and unit of a quantity; empty if it was not read."""
     parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
     reading = readings.get(parameter.code) if parameter else None
     if parameter is None or reading is None:
         return "", ""
     from tui.drive.values import NOT_AVAILABLE  # the first picture needs none of it
 
-    # the row, or the bar, shows the age of all its values in a place of its own
+    # the row, or the bar, shows one age for all its values
     return reading.drawn(
         reading.time,
         current=lambda value: (value.text, value.unit),
@@ -348,7 +351,7 @@ def value_cell(
 
 
 def _commanding(fleet: Fleet, device: int) -> str:
-    """The other program that commands a drive, where one does."""
+    """The other program that commands a drive; empty if none does."""
     other = fleet.line.facts.commander(device)
     return f"{other.name} {other.where}".rstrip() if other is not None else ""
 

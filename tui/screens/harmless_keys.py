@@ -1,4 +1,4 @@
-"""Keys that can do no harm in a burst: they act at once, all others wait to be known as alone."""
+"""Keys that can do no harm in a burst: they act immediately; all others wait until classified."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .keys.table import key_meanings
 
 log = logging.getLogger(__name__)
 
-TOGETHER_KEYS = "{count} keys came together and were ignored."
-TOO_LATE_KEYS = "{count} keys came too late and were ignored."
-NOT_ALONE_KEY = "A key was ignored: it did not come alone."
-TOO_LATE_KEY = "A key was ignored: it came too late."
+TOGETHER_KEYS = "Ignored {count} keys that arrived together."
+TOO_LATE_KEYS = "Ignored {count} keys that arrived too late."
+NOT_ALONE_KEY = "Ignored a key that did not arrive alone."
+TOO_LATE_KEY = "Ignored a key that arrived too late."
 
 
 class HarmlessKeys(Panel):
-    """Knows what the next key can do on the present screen."""
+    """Decides what the next key can do on the present screen."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -28,8 +28,8 @@ class HarmlessKeys(Panel):
     def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
         """Return True if a key can do no harm in a burst; in the thread that reads the keys.
 
-        Only the first key of a burst may show another screen. While the key read at the time
-        `after` has not had its whole effect, it is not known what the next one does.
+        Only the first key of a burst may show another screen. The effect of a key is not known
+        before the key read at the time `after` has taken full effect.
         """
         try:
             if self._typed.done_to < after or self.opening.goes_on:
@@ -37,11 +37,11 @@ class HarmlessKeys(Panel):
             moves = key in CURSOR_KEYS or takes_text(self.focused)
             return (begins or moves) and self.only_shows(key, character)
         except Exception:
-            log.exception("a key waits until it is known whether it came alone")
+            log.exception("a key waits until it is classified")
             return False
 
     def only_shows(self, key: str, character: str | None) -> bool:
-        """Return True if a key can only move a cursor, write text or show something now."""
+        """Return True if a key can only move a cursor, type text or show something now."""
         writes = key in EDITS or (character is not None and character.isprintable())
         screen = self.screen
         if takes_text(self.focused):
@@ -54,8 +54,8 @@ class HarmlessKeys(Panel):
         known = [meanings[name] for name in (key, character or key) if name in meanings]
         return all(known) if known else key in CURSOR_KEYS
 
-    def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
-        """Report that keys came at once, or too late, and did nothing."""
+    def report_ignored_keys(self, count: int, *, late: bool = False) -> None:
+        """Report keys that were ignored because they arrived together, or too `late`."""
         if count > 1:
             text = TOO_LATE_KEYS if late else TOGETHER_KEYS
         else:

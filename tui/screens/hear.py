@@ -1,4 +1,4 @@
-"""The key that listens to a line: which one, whether the panel may fall silent there, and going."""
+"""The key that listens to a line: choosing it, checking that polling may stop, and starting."""
 
 from __future__ import annotations
 
@@ -17,52 +17,55 @@ if TYPE_CHECKING:
 
     from .app_port import Panel
 
-LISTENS_ALREADY = "The panel listens already; Esc ends that."
+LISTENS_ALREADY = "The panel is already listening. Press Esc to end it."
 NO_LINE = "No line is chosen. Choose one on Line, then press H to monitor it."
 CLOSES = (
-    "The panel stops polling these drives: the port is opened for reading only, and nothing is sent"
-    " until you end it, no stop either. Another master has to be there that asks and stops them."
+    "The panel stops polling these drives. It opens the port for reading only and sends nothing"
+    " until you press Esc, not even a stop. Another master must poll and stop them."
 )
 CLOSE_FIRST = "To stop polling it anyway, close the line first: Ctrl+P, close."
 
 
 def why_not_hear(fleet: Fleet) -> str:
-    """Why the panel may not fall silent on a line, in a sentence; empty where it may."""
+    """Return why the panel may not stop polling a line to listen to it; empty if it may."""
     from tui.session.monitor.timeout import names_of, polling_stop_text
 
     line, watch = fleet.line, fleet.line_watch
     if not isinstance(line.link, SerialLink):
-        return "Over a network other masters cannot be monitored; this list shows all its traffic."
+        return (
+            "Other masters cannot be monitored over a network. Frames (7) shows all traffic of"
+            " this connection."
+        )
     if others := line.facts.others:
         who = ", ".join(other.text for other in others)
-        return f"Not listened to: {who} uses the line too, and a port like that has no other user."
+        return f"Not monitored: {who} also uses the line. Listening needs the port to itself."
     if running := watch.under_command():
         who = "; ".join(names_of([session]) for session in running)
-        return f"Not monitored: {who} runs by a command of this panel. Stop it first."
+        return f"Not monitored: this panel commands a running motor ({who}). Stop it first."
     if acting := watch.pending_timeouts():
         reported = next(session for session in fleet.sessions if session.device in acting)
         text = polling_stop_text(reported, watch=acting[reported.device])
-        return f"Not listened to, as the panel feeds drives. {text} {CLOSE_FIRST}"
+        return f"Not monitored: the panel keeps drives alive. {text} {CLOSE_FIRST}"
     if unread := watch.unread():
         who = names_of([unread[0]])
-        return f"Not monitored yet: the reaction of {who} when polling stops was not read."
+        return f"Not monitored yet: the communication loss reaction of {who} has not been read."
     unknown = [device for device, drive in fleet.found.items() if drive.console is None]
     if unknown:
         return (
-            f"Not monitored: the reaction of device {unknown[0]} when polling stops is not known."
+            f"Not monitored: the communication loss reaction of device {unknown[0]} is not known."
             f" {CLOSE_FIRST}"
         )
     return ""
 
 
 def chosen_line(app: Panel) -> tuple[str, str]:
-    """The line under the cursor of Line, else the one that is shown, with the typed profile."""
+    """The line under the cursor of Line, else the one shown; with the profile typed on Line."""
     choice = getattr(app.screen, "line_to_hear", None)
     return choice() if choice is not None else (app.line_text, "")
 
 
 async def hear(app: Panel, text: str, profile: str) -> None:
-    """Listen to a line; the app's keys are ignored until that has begun."""
+    """Listen to a line; keys are ignored until listening has begun."""
     try:
         await _ask_to_hear(app, text, profile)
     finally:
@@ -75,14 +78,14 @@ async def _ask_to_hear(app: Panel, text: str, profile: str) -> None:
             app.notify(why, severity="warning")
             return
         app.show_line(here)
-        about = f"{here.opened.label} is closed for the panel. {CLOSES}" if here.fleet.found else ""
+        about = CLOSES if here.fleet.found else ""
         if not await app.may_let_go("Listen to the line?", yes="Listen", no="Cancel", always=about):
             return
-        if why := why_not_hear(here.fleet):  # it may have changed while that was asked
+        if why := why_not_hear(here.fleet):  # it may have changed during the question
             app.notify(why, severity="warning")
             return
         app.show_line(here)
-    app.hearing = text  # from here on no second key may begin it: the port would be taken twice
+    app.hearing = text  # set now, so that a second key does not open the port twice
     try:
         if here is not None:
             await app.disconnect()
@@ -105,12 +108,12 @@ async def _listen(app: Panel, text: str, profile: str) -> None:
         try:
             await asyncio.shield(opening)
         except asyncio.CancelledError:
-            await asyncio.wait([opening])  # until then nothing else can have the port
+            await asyncio.wait([opening])  # the port can be released only then
             await asyncio.to_thread(heard.close)
             raise
     except (LineError, DriveError) as error:
         app.hearing = ""
-        app.say_first(str(error), "Enter opens the line; H tries to listen again.", "error")
+        app.say_first(str(error), "Press Enter to open the line, H to try again.", "error")
         return
     app.push_screen(ListeningScreen(heard))
 

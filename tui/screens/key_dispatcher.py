@@ -1,4 +1,4 @@
-"""Keys before they reach a screen: stops before everything, and each key at its turn."""
+"""Keys before they reach a screen: stop keys first, and each other key in its turn."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from tui.widgets.small import is_too_small
 
 from .app_port import Panel
 from .harmless_keys import HarmlessKeys
-from .keys.table import STOPS_ALL, STOPS_NOBODY
+from .keys.table import STOPS_ALL, STOPS_NONE
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -31,12 +31,13 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 NO_STOP_HERE = (
-    "A monitored line gets no stop: its master stops the motor. Press Esc to end listening."
+    "No stop is sent on a monitored line. Stop the motor at its master, or press Esc to end"
+    " listening."
 )
-NOBODY_TO_STOP = "Nothing was stopped: no drive is known here."
+NOBODY_TO_STOP = "Nothing was stopped: no drive is known."
 UNREACHED = (
-    "NOT STOPPED: device {}, as it is not known which drive it is. Stop it at the machine, or type"
-    " its profile on Line, then s."
+    "NOT STOPPED: device {}, not identified. Stop it at the machine, or enter its profile on Line"
+    " and press s."
 )
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
@@ -44,7 +45,7 @@ TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it ag
 
 
 class KeyDispatcher(HarmlessKeys):
-    """Keys for the whole panel; their first part runs in the thread of the keys."""
+    """Handles all keys of the panel; the first part runs in the thread that reads keys."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -53,10 +54,10 @@ class KeyDispatcher(HarmlessKeys):
         self.unreached = ("", 0.0)
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
-        """Stop, if the key means that now; may be called in any thread.
+        """Stop if the key is a stop key now; may be called in any thread.
 
-        `left_at` is when a key was read that may leave a text, like Escape: a Space behind it is no
-        text, though that key may not have had its effect yet.
+        `left_at` is when a key was read that may leave a text field, such as Escape. A Space after
+        it is not text, even if that key has not taken effect yet.
         """
         if key not in STOP_KEYS:
             return False
@@ -74,11 +75,11 @@ class KeyDispatcher(HarmlessKeys):
             left = left_at is not None and left_at > self._typed.done_to
             return self._space_is_text() and not left
         except Exception:
-            log.exception("a space is taken for a stop")
+            log.exception("Space counts as a stop")
             return False
 
     def last_stop(self, error: Exception) -> None:
-        """Stop every drive by its prepared frames: keys, or what they do, failed by an error.
+        """Stop every drive by its prepared frames, after an internal error in handling keys.
 
         Uses nothing that `take_stop_key` uses.
         """
@@ -87,14 +88,14 @@ class KeyDispatcher(HarmlessKeys):
             line.fleet.last_stop(error)
 
     def sequence_swallowed(self, data: bytes) -> None:
-        """A key came that no known terminal sends; in the thread that reads the keys."""
+        """Report an unknown key during the F12 test; in the thread that reads keys."""
         if self._trying_f12:
             from tui.screens.keys.first_keys import unknown_text
 
             self._from_keys(self.say_first, unknown_text(data), "", "alarm")
 
     def try_f12(self) -> None:
-        """On the first start on a terminal: does F12 arrive?"""
+        """On the first start on a terminal, offer to test if F12 arrives."""
         from tui.screens.keys.first_keys import OFFER, was_tried
 
         self._trying_f12 = not self.is_headless and not was_tried()
@@ -102,7 +103,7 @@ class KeyDispatcher(HarmlessKeys):
             self.say_first(OFFER, "Or choose a line and press Enter, or n to type one.")
 
     def _f12_arrived(self) -> None:
-        """F12 came while it was tried; in the thread that reads the keys."""
+        """Report that F12 arrived in the test; in the thread that reads keys."""
         from tui.screens.keys.first_keys import ARRIVED, remember
 
         self._trying_f12 = False
@@ -110,26 +111,26 @@ class KeyDispatcher(HarmlessKeys):
         self._from_keys(self.say_first, ARRIVED, "Choose a line and press Enter.")
 
     def _from_keys(self, tell: Callable[..., None], *words: str) -> None:
-        """Do something in the screen's loop, from the thread that reads the keys."""
+        """Show a message in the app's loop, from the thread that reads keys."""
         soon_in_loop(self, tell, *words)
 
     def stop_stamp(self) -> object:
-        """Another object after every stop; may be called in any thread."""
+        """Return a value that changes with every stop; may be called in any thread."""
         return self._stops
 
     @property
     def stroke(self) -> Stroke | None:
-        """Facts about the key that has its effect now; None if there is none."""
+        """The stroke of the key that is taking effect now; None if there is none."""
         return self._typed.stroke
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """A space belongs to the text that is being typed."""
+        """Disable the stop by Space while a text is being typed."""
         if action == "stop_by_space":
             return not self._space_is_text()
         return super().check_action(action, parameters)
 
     def _space_is_text(self) -> bool:
-        """True if a space is text under the cursor. While a line opens, nothing is typed."""
+        """True if Space is text in the focused field. While a line opens, nothing is typed."""
         ignored = self.opening.goes_on and not self.screen.is_modal
         return takes_space(self.focused) and not ignored and not is_too_small(*self.size)
 
@@ -166,7 +167,7 @@ class KeyDispatcher(HarmlessKeys):
             carried_on(lambda: soon_in_loop(self, self._tell_unreached))
 
     def _tell_unreached(self) -> None:
-        """A stop of all that reached nobody, or not everybody, says so; once over everything."""
+        """Report drives that a stop of all did not reach, or that there is no drive."""
         strangers = [device for fleet in self.fleets for device in fleet.strangers]
         if not strangers:
             if not any(fleet.sessions for fleet in self.fleets):
@@ -194,24 +195,24 @@ class KeyDispatcher(HarmlessKeys):
             void_questions(self, device)
 
     def stopped_elsewhere(self, devices: list[int]) -> None:
-        """Another program stopped drives: what was typed before it, and is asked, is void."""
+        """Discard keys and questions after another program stopped drives."""
         self._stops += 1
         self._void_questions(devices)
 
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
-        """Stop one drive, in its own way."""
+        """Stop one drive by this kind of stop."""
         self._stops += 1
         for fleet in self.fleets:
             if console in fleet.consoles:
                 self._stop_sessions(fleet, [console.session], order)
 
     async def on_event(self, event: Event) -> None:
-        """A key keeps an armed drive armed; the next one waits for it."""
+        """Handle a key in its turn; each key extends the arming of armed drives."""
         if isinstance(event, InputEvent | Paste) and not self.is_running:
-            return  # the panel ends: there is no screen any more that could take it
+            return  # the panel ends: no screen is left for it
         if isinstance(event, Key | Paste) and not event.is_forwarded:
             if not self._typed.admit(event) or is_too_small(*self.size):
-                return  # nobody acts on a screen that cannot be seen
+                return  # keys do not act on a screen that cannot be seen
             if self._is_ignored(event):
                 return
             self.hurry()
@@ -249,8 +250,7 @@ class KeyDispatcher(HarmlessKeys):
             self.say_first(canceled, "Choose a line and press Enter.")
 
     def _is_void(self, key: Key) -> bool:
-        """Return True if a stop came while a key went through the screen, before it has its
-        effect."""
+        """Return True if a stop came after a key was read, before the key took effect."""
         stroke = stroke_of(key)
         return stroke is not None and stroke.stamp != self.stop_stamp()
 
@@ -262,15 +262,15 @@ class KeyDispatcher(HarmlessKeys):
 
     @property
     def stop_target_text(self) -> str:
-        """The words of the stop key in the line of keys."""
+        """The label of the stop key in the key bar."""
         chosen = self._open_drive()
         if self.hearing and not self.fleets:
-            return STOPS_NOBODY
+            return STOPS_NONE
         return f"STOP {chosen.device}" if chosen is not None else STOPS_ALL
 
 
 def every_fleet(panel: Panel) -> list[Fleet]:
-    """The drives of every open line, also after an internal error in finding the shown one."""
+    """The drives of every open line, even after an internal error in finding the shown one."""
     try:
         return panel.fleets
     except Exception:

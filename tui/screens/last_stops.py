@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 STOPPED_WITHIN = 60.0
-"""Seconds that a motor may take to its standstill before the panel gives up waiting."""
+"""Seconds that the panel waits for the standstill of a motor."""
 BY = "leaving the panel"
 STANDSTILL_NOT_KNOWN = "it is not known whether the motor stopped. Check it at the machine."
 
@@ -38,20 +38,20 @@ class LineStops:
         """False if an error ended the wait for the standstill."""
 
     def order(self) -> None:
-        """End all work on the line's drives, then order a stop of each motor started from here."""
+        """End all work on the line's drives, then order a stop of each motor started here."""
         for session in self.fleet.sessions:
             try:
-                session.work.stop(BY)  # no frame of it from now on: what runs by then is stopped
+                session.work.stop(BY)  # it sends no more frames, so no motor starts after the stop
             except Exception:
                 log.exception("work on device %s was not ended", session.device)
         self.sessions = self._started_here()
         if not self.sessions or self._stopped(self.sessions):
             return
-        for session in self.sessions:  # an error about one keeps no other from its stop
+        for session in self.sessions:  # one by one: an error for one does not prevent the others
             self._stopped([session])
 
     def _started_here(self) -> list[DriveSession]:
-        """Drives under command, and those whose run frame may be on its way."""
+        """Commanded drives, and those whose run frame may be on the way."""
         try:
             running = self.fleet.line_watch.under_command()
         except Exception:
@@ -63,7 +63,7 @@ class LineStops:
         return [*running, *(session for session in begun if session not in running)]
 
     def _stopped(self, sessions: Sequence[DriveSession]) -> bool:
-        """Order one stop of them; whether that was done."""
+        """Order a stop of these drives; True if it was ordered."""
         try:
             self.fleet.stop(sessions, by=BY)
         except Exception as error:
@@ -77,7 +77,7 @@ class LineStops:
         return True
 
     def wait(self, seconds: float) -> bool:
-        """Wait for the standstill of all; True if every motor was seen at rest."""
+        """Wait for the standstill of all; True if every motor was read at standstill."""
         ordered = [session for session in self.sessions if session.device not in self.troubles]
         try:
             summary = self.fleet.stopper.wait(ordered, seconds)
@@ -126,12 +126,12 @@ class LastStops(NamedTuple):
         return counted(len(devices), single, several, devices=", ".join(devices))
 
     def follow(self) -> str:
-        """Wait for the standstill of all, for a bounded time; the result of each."""
+        """Wait for the standstill of all, for at most `STOPPED_WITHIN`; return the results."""
         self.wait()
         return "\n".join(text for line in self.lines for text in line.lines())
 
     def wait(self) -> bool:
-        """Wait for the standstill of all, for a bounded time; True if all were seen at rest."""
+        """Wait at most `STOPPED_WITHIN` for all; True if all were read at standstill."""
         end = time.monotonic() + STOPPED_WITHIN
         stood = [line.wait(max(0.0, end - time.monotonic())) for line in self.lines]
         return all(stood)

@@ -1,4 +1,4 @@
-"""Leaving a line or the panel: nothing is left to itself unasked, motors least of all."""
+"""Leaving a line or the panel: asks first if a drive would react, or a motor runs."""
 
 from __future__ import annotations
 
@@ -20,19 +20,25 @@ if TYPE_CHECKING:
     from .dialogs.confirm import Confirm
     from .dialogs.leave import LeaveChoice
 
-STOP_OR_TAKE_OVER = "Space stops it. To take it over: Esc, then T on Monitor."
+STOP_OR_TAKE_OVER = "Press Space to stop it. To take it over, press Esc, then T on Monitor."
+ONE_STAGED = "Device {device}: 1 staged edit is not written."
+MANY_STAGED = "Device {device}: {count} staged edits are not written."
+ONE_UNSAVED = "Device {device}: 1 written setting is not saved to EEPROM. It is lost at power-off."
+MANY_UNSAVED = (
+    "Device {device}: {count} written settings are not saved to EEPROM. They are lost at power-off."
+)
 
 
 class Leaving(Panel):
-    """Steps of the app before it lets drives go."""
+    """Steps of the app before it disconnects drives."""
 
     settled: bool
-    """True if it was decided what happens to motors that run by a command of this panel."""
+    """True once it is decided what happens to motors that this panel commands."""
     _requested: Confirm | None = None
-    """The question before leaving, while nothing runs by a command from here."""
+    """The question before leaving, if no motor runs on a command of this panel."""
 
     async def action_quit(self) -> None:
-        """Leave; where a motor runs by a command from here, or a drive trips, not unasked."""
+        """Quit; ask first if a motor runs on a command of this panel, or a drive would react."""
         from .dialogs.leave import Leave
         from .dialogs.now import MotorStates
 
@@ -45,20 +51,20 @@ class Leaving(Panel):
             return
         if self._requested in self.screen_stack:
             return
-        self._requested = self._question(self.fleets, "Leave the panel?", yes="Leave", no="Stay")
+        self._requested = self._question(self.fleets, "Quit the panel?", yes="Quit", no="Stay")
         if self._requested is None:
             self.exit()
         else:
             self.push_screen(self._requested, self._leave)
 
     def _motors(self) -> list[DriveSession]:
-        """Drives of all lines commanded by this panel whose motors are not surely at standstill."""
+        """Drives that this panel commands and whose motors are not known to be at standstill."""
         return [session for fleet in self.fleets for session in fleet.line_watch.under_command()]
 
     def _leaving_report(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
-        """Return what happens to the drives of lines that are left; several lines by their names.
+        """Return what happens to the drives of these lines; with line names if there are several.
 
-        `on_purpose`: motors that run are put on record as left running.
+        `on_purpose`: running motors are recorded as left running.
         """
         reported = []
         for fleet in fleets:
@@ -73,7 +79,7 @@ class Leaving(Panel):
     def _left_running(
         self, fleet: Fleet, sessions: list[DriveSession], *, on_purpose: bool
     ) -> list[str]:
-        """Which motors run, what each drive does left alone, and what others on its line do."""
+        """The running motors with their drives' reactions, and what other programs do."""
         from tui.session.monitor.timeout import polling_stop_text
         from tui.session.sharing.handover import peer_effect_text
 
@@ -88,7 +94,7 @@ class Leaving(Panel):
         return reported
 
     def _left_behind(self, fleet: Fleet) -> list[str]:
-        """Motors that no program commands, who started each, and what to do."""
+        """Motors that no program commands, with their starters and what to do."""
         from tui.session.monitor.timeout import names_of
 
         return [
@@ -98,7 +104,7 @@ class Leaving(Panel):
         ]
 
     def _tripping(self, fleet: Fleet, but: Sequence[DriveSession] = ()) -> list[str]:
-        """Which drives act on their communication timeout once they are left, and when."""
+        """The drives that react to their communication timeout when polling stops, and when."""
         from tui.session.monitor.timeout import names_of, polling_stop_text
 
         reported = {session.device for session in but}
@@ -110,12 +116,12 @@ class Leaving(Panel):
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
         found = [polling_stop_text(*same, watch=watch) for (_, watch), same in alike.items()]
         found += [
-            f"{names_of([item])}: what it does on loss of communication was not read yet."
+            f"{names_of([item])}: its communication loss reaction has not been read yet."
             for item in line_watch.unread()
             if item.device not in reported
         ]
         found += [
-            f"Device {device}: its reaction when polling stops is not known."
+            f"Device {device}: its communication loss reaction is not known."
             for device, drive in fleet.found.items()
             if drive.console is None
         ]
@@ -140,7 +146,7 @@ class Leaving(Panel):
         self.exit()
 
     async def _stop_and_leave(self) -> None:
-        """Stop what runs by an order from here, then leave; stay where one does not stop."""
+        """Stop all motors that this panel commands, then quit; stay if one does not stop."""
         if await asyncio.to_thread(self.stop_motors):
             self.settled = True
             self.exit()
@@ -151,16 +157,16 @@ class Leaving(Panel):
         soon_in_loop(self, self.exit)
 
     def stop_motors(self) -> bool:
-        """Stop every motor that runs by an order from here; True when none runs any more.
+        """Stop every motor that this panel commands; True if all have stopped.
 
-        Waits for it; may be called in any thread but the loop's.
+        Blocks until then; may be called in any thread except the loop's.
         """
         return self.order_stops().wait()
 
     def order_stops(self) -> LastStops:
         """Order a stop of every motor that Drive Panel runs, and end all other work.
 
-        May be called in any thread, returns at once and raises nothing.
+        May be called in any thread, returns immediately and raises nothing.
         """
         labels = {id(item.fleet): f"{item.opened.label}: " for item in self.panel_lines}
         several = len(labels) > 1
@@ -176,11 +182,10 @@ class Leaving(Panel):
             self.exit()
 
     async def may_let_go(self, question: str, *, yes: str, no: str, always: str = "") -> bool:
-        """Return True if the drives of the line may be left alone; asks where that trips one that
-        runs.
+        """Return True if polling of the line's drives may stop; ask first if a drive reacts.
 
-        With `always` it asks in any case, and says that. Belongs into a worker: it waits for
-        the answer.
+        With `always` it asks in any case, with that text. Call it in a worker: it waits for the
+        answer.
         """
         fleets = [self.fleet] if self.fleet is not None else []
         requested = self._question(fleets, question, yes=yes, no=no, always=always)
@@ -189,7 +194,7 @@ class Leaving(Panel):
         answer: asyncio.Future[bool | None] = asyncio.get_running_loop().create_future()
 
         def reported(sure: bool | None) -> None:
-            if not answer.done():  # who asked may have given up meanwhile
+            if not answer.done():  # the worker may have been canceled
                 answer.set_result(sure)
 
         self.push_screen(requested, reported)
@@ -198,7 +203,7 @@ class Leaving(Panel):
     def _question(
         self, fleets: Sequence[Fleet], question: str, *, yes: str, no: str, always: str = ""
     ) -> Confirm | None:
-        """Return the question before polling stops; None if nothing needs to be reported."""
+        """Return the question before polling stops; None if nothing is to be confirmed."""
         from .dialogs.confirm import Confirm
         from .dialogs.now import MotorStates
 
@@ -217,20 +222,17 @@ class Leaving(Panel):
         for console in fleet.consoles:
             device, editor = console.device, console.begun_editor
             if editor is not None and len(editor.staging.edits):
-                count = len(editor.staging.edits)
-                edits = "edit is" if count == 1 else "edits are"
-                reported.append(f"Device {device}: {count} staged {edits} not written.")
-            if count := len(console.session.unsaved):
-                are, they = ("setting is", "it is") if count == 1 else ("settings are", "they are")
-                reported.append(
-                    f"Device {device}: {count} written {are} not saved to EEPROM; {they} lost at"
-                    " power-off."
-                )
+                staged = len(editor.staging.edits)
+                text = ONE_STAGED if staged == 1 else MANY_STAGED
+                reported.append(text.format(device=device, count=staged))
+            if unsaved := len(console.session.unsaved):
+                text = ONE_UNSAVED if unsaved == 1 else MANY_UNSAVED
+                reported.append(text.format(device=device, count=unsaved))
         return reported
 
 
 def _concerned(fleet: Fleet) -> list[DriveSession]:
-    """Drives of a line that run by a command from here, or act once they are left alone."""
+    """Drives of a line that this panel runs, or that react when polling stops."""
     turning = {session.device for session in fleet.line_watch.under_command()}
     turning |= fleet.line_watch.pending_timeouts().keys()
     turning |= {console.device for console in fleet.consoles if fleet.left_behind(console)}

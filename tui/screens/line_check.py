@@ -1,4 +1,4 @@
-"""Asking about a line that is not as it was: another adapter, or other drives, than before."""
+"""The question about a changed line: another adapter, or other drives, than before."""
 
 from __future__ import annotations
 
@@ -17,22 +17,22 @@ FOLLOWS = (
     "Until you confirm, the line is read-only: values are shown, and only stops are written to"
     " its drives."
 )
-AS_IT_WAS = "There is nothing to accept: the line is as it was."
+UNCHANGED = "Nothing to accept: the line is unchanged."
 
 
 class LineCheck(Panel):
-    """Looks at the open line now and then; differences are confirmed once, and on demand."""
+    """Checks the open line regularly; asks once to confirm differences, and on request."""
 
     def __init__(self) -> None:
         super().__init__()
         self._waiting_for: tuple[str, ...] = ()
         """Differences in the last question."""
         self._line_question: Confirm | None = None
-        """The last question of that."""
+        """The last question."""
         self._connected_since: float | None = None
 
-    def mind_line(self) -> None:
-        """Ask about differences, once no search runs and no other question is open."""
+    def check_line(self) -> None:
+        """Ask about differences, once no scan runs and no other question is open."""
         known = self._known()
         if known is None:
             self._waiting_for, self._connected_since = (), None
@@ -45,10 +45,10 @@ class LineCheck(Panel):
             self._ask(known, by_itself=True)
 
     def action_accept_line(self) -> None:
-        """Ask again whether the line is meant as it is now."""
+        """Ask again if this is the right line."""
         known = self._known()
         if known is None or not known.changed:
-            self.tell(AS_IT_WAS)
+            self.tell(UNCHANGED)
         else:
             self._ask(known)
 
@@ -61,23 +61,23 @@ class LineCheck(Panel):
         return self.screen.is_modal or self._is_opening() or (searching and self.chosen is None)
 
     def _is_opening(self) -> bool:
-        """True until Monitor replaces the first picture, and all that is above it."""
+        """True until Monitor replaces the first screen and everything above it."""
         from .opening import OpeningScreen
 
         return any(isinstance(screen, OpeningScreen) for screen in self.screen_stack)
 
     def _ask_again_if_hidden(self) -> None:
-        """A screen may have replaced the question, or cover it; nobody has answered it then."""
+        """Ask again if a screen replaced the question, or covers it, before it was answered."""
         question = self._line_question
         if question is None or question.is_answered or question is self.screen:
             return
         if self.screen.is_modal:
             return
-        question.void()  # nothing is asked twice by a way back to it
+        question.void()  # so that it does not reappear when the cover is closed
         self._waiting_for, self._line_question = (), None
 
     def _look_again(self, known: KnownLine) -> None:
-        """A line that was lost may have come back with another adapter."""
+        """Check the adapter after a reconnection: it may be another one."""
         assert self.opened is not None
         state = self.opened.line.state
         if state.status.value != "connected":
@@ -97,12 +97,12 @@ class LineCheck(Panel):
                 # in a thread: the disk may hang, and the line is written to at once
                 threading.Thread(target=known.accept, name="line check", daemon=True).start()
             elif sure:
-                self._waiting_for = ()  # more has come meanwhile: all of it is asked
+                self._waiting_for = ()  # more differences since: ask about all of them
 
         requested = Confirm(
             QUESTION,
             "\n".join((*changed, FOLLOWS)),
-            yes="Accept",
+            yes="Confirm",
             no="Keep read-only",
             loses=True,
             by_itself=by_itself,

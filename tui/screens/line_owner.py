@@ -1,4 +1,4 @@
-"""The one line that the panel has open, and the drives on it."""
+"""Opening and closing of the panel's lines."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 CHOSEN_CONNECTS_WITHIN = 4.0
-"""Seconds in which a line chosen by a person must connect."""
+"""Seconds within which a line chosen by a person must connect."""
 
-WAY_TO_ACCEPT = "If that is right, take the line as it is now: Ctrl+P, accept."
+WAY_TO_ACCEPT = "If this is the right line, press Ctrl+P and type accept."
 
 Opener = Callable[..., "OpenLine"]
 
 
 class LineOwner(Panel):
-    """Opens lines and closes them; the one opened or chosen last is shown."""
+    """Opens and closes lines; the one opened or chosen last is shown."""
 
     _open: Opener
     _gone = False
-    """True if the panel was left: what is opened from then on is closed again."""
+    """True after the panel has ended: a line opened since is closed again."""
     _journal: Journal | None = None
     panel_lines: tuple[PanelLine, ...] = ()
     opened: OpenLine | None = None
@@ -45,7 +45,7 @@ class LineOwner(Panel):
 
     @property
     def journal(self) -> Journal:
-        """The record of what is written to drives."""
+        """The record of all writes to drives."""
         if self._journal is None:
             from tui.session.journal import Journal
 
@@ -54,20 +54,20 @@ class LineOwner(Panel):
 
     @property
     def journal_trouble(self) -> str:
-        """Why what is written is not on record; empty while it is."""
+        """Why writes cannot be recorded; empty while they are."""
         return self._journal.trouble if self._journal is not None else ""
 
     async def connect(self, text: str, *, remember: bool = True) -> None:
         """Open a line and show it; raises the line's errors.
 
-        Lines with drives stay open below. One that is open with other settings is closed before.
-        One that is not to be remembered is none of those used lately.
+        Lines with drives stay open. The same line with other settings is closed first. Without
+        `remember` it is not added to the recent lines.
         """
         if (here := self.open_line_of(text)) is not None:
             await self._close(here)
         shown = self._shown()
         if shown is not None and not shown.fleet.found:
-            await self._close(shown)  # nothing is on it
+            await self._close(shown)  # it has no drives
         opening = asyncio.ensure_future(asyncio.to_thread(self._open_here, text, remember))
         try:
             opened = await asyncio.shield(opening)
@@ -77,7 +77,7 @@ class LineOwner(Panel):
         from tui.session.fleet import Fleet
         from tui.session.starts.keeper import StartKeeper
 
-        # the motors of a simulated line end with it
+        # no record for a simulated line: its motors end with it
         starts = StartKeeper("panel", clock=self.clock) if opened.simulation is None else None
         if starts is not None:
             starts.left_running = self.leave_running
@@ -94,7 +94,7 @@ class LineOwner(Panel):
         self.opening.connected = True
 
     def open_line_of(self, text: str) -> PanelLine | None:
-        """The open line that a text means, whatever its settings; None where it is not open."""
+        """The open line that a text names, whatever its settings; None if it is not open."""
         if not self.panel_lines:
             return None
         from tui.session.connect.line_key import line_key
@@ -105,7 +105,7 @@ class LineOwner(Panel):
         )
 
     def show_line(self, line: PanelLine | None) -> None:
-        """Show another of the open lines; no drive is open then."""
+        """Show another open line; no drive of it is open yet."""
         self.chosen = None
         self.opened, self.fleet = (line.opened, line.fleet) if line is not None else (None, None)
 
@@ -113,7 +113,7 @@ class LineOwner(Panel):
         return next((line for line in self.panel_lines if line.opened is self.opened), None)
 
     def _look_after(self, fleet: Fleet) -> None:
-        """Show who shares the line, and stop the motors of programs on it that have exited."""
+        """Follow stops by other programs, and stop motors of programs that have exited."""
         from tui.bus.line_events import DevicesStopped
         from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
@@ -132,7 +132,7 @@ class LineOwner(Panel):
         )
 
     def _open_here(self, text: str, remember: bool) -> OpenLine:
-        """Open a line in a thread; closed again where the panel was left meanwhile."""
+        """Open a line in a thread; close it again if the panel has ended in the meantime."""
         opened = self._open(
             text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN, program="panel"
         )
@@ -140,7 +140,7 @@ class LineOwner(Panel):
             from tui.session.connect.known_line import KnownLine
 
             opened.known = KnownLine(opened.line, way=WAY_TO_ACCEPT)
-        # here, where nobody waits for a key: what the loop asks for next
+        # imported here, in a thread, because the loop needs them next and would block on them
         import tui.screens.monitor.screen
         import tui.session.fleet  # noqa: F401
 
@@ -152,10 +152,10 @@ class LineOwner(Panel):
         return opened
 
     def stopped_elsewhere(self, devices: list[int]) -> None:
-        """Another program stopped drives: what is being asked about them is void."""
+        """End the questions about drives that another program stopped."""
 
     async def disconnect(self) -> None:
-        """Close the line that is shown, if there is one; another open one is shown then."""
+        """Close the line that is shown, if any; then show another open one."""
         if (shown := self._shown()) is not None:
             await self._close(shown)
 
@@ -169,26 +169,26 @@ class LineOwner(Panel):
         if self.opened is line.opened:
             self.show_line(self.panel_lines[-1] if self.panel_lines else None)
         line.fleet.forget()
-        # whole, though the opening that it is closed for may be canceled
+        # completed even if the opening that needs it is canceled
         await asyncio.shield(asyncio.to_thread(_close_all_of, line))
         log.info("closed %s", line.opened.label)
 
 
 def _close_all_of(line: PanelLine) -> None:
-    """Close a line, and wait for what is still to be written of its motors."""
+    """Close a line, and wait until the records of its motors are written."""
     line.opened.close()
     if line.fleet.starts is not None:
         line.fleet.starts.close()
 
 
 def _remember(text: str) -> None:
-    """Put the line among those used lately, by its adapter's lasting name."""
+    """Add the line to the recent ones, by its adapter's permanent name."""
     from tui.session.connect.known_lines import remembered_text
 
     remember_line(remembered_text(text))
 
 
 def _close_unwanted(opening: asyncio.Future[OpenLine]) -> None:
-    """Close a line that was opened after another one had been chosen."""
+    """Close a line whose opening was canceled before it finished."""
     if not opening.cancelled() and opening.exception() is None:
         threading.Thread(target=opening.result().close, name="close line", daemon=True).start()

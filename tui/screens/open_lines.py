@@ -1,4 +1,4 @@
-"""The lines that the panel has open: one is shown, the others go on below; and one that opens."""
+"""The open lines of the panel: one is shown, the others stay open; and a line being opened."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class LineOpening:
         self.connected = False
         """True once the line is open, while the work that asked for it still has to end."""
         self.ended = float("-inf")
-        """When the last opening ended: a key read before was typed while it went on."""
+        """When the last opening ended: a key read before was typed during it."""
         self._goes_on = bool(text)
         self._work: Worker[Any] | None = None
 
@@ -45,11 +45,11 @@ class LineOpening:
         return self._goes_on and (work is None or not work.is_finished)
 
     def begin(self, text: str, work: Worker[Any]) -> None:
-        """Ignore keys from now on, until this work or the one that takes its place ends it."""
+        """Ignore keys until this work, or the work that replaces it, ends the opening."""
         self.text, self._work, self.connected, self._goes_on = text, work, False, True
 
     def end(self, work: Worker[Any] | None = None) -> None:
-        """Take keys again; if another work has begun an opening since, nothing changes."""
+        """Accept keys again; no effect if another work has begun an opening since."""
         if self._goes_on and (work is None or work is self._work):
             self.ended, self._goes_on = time.monotonic(), False
 
@@ -63,7 +63,7 @@ class LineOpening:
 
 
 class LineEvents(EventLog):
-    """Events of the drives of one line: with its name, unless it is the one shown."""
+    """Events of the drives of one line; with the line's name, unless it is the one shown."""
 
     def __init__(self, events: EventLog, label: str, is_shown: Callable[[], bool]) -> None:
         super().__init__()
@@ -74,7 +74,7 @@ class LineEvents(EventLog):
     def add(
         self, kind: str, text: str, device: int | None = None, wall: float | None = None
     ) -> Event | None:
-        """Keep an event among those of all lines; None if it repeats the one before."""
+        """Add an event to those of all lines; None if it repeats the one before."""
         text_of_all, device_of_all = self._named(text, device)
         new = self._all.add(kind, text_of_all, device_of_all, wall)
         if new is not None:
@@ -82,12 +82,12 @@ class LineEvents(EventLog):
         return new
 
     def join(self, event: Event) -> None:
-        """Keep an event of another program on the line among those of all lines."""
+        """Add an event of another program on the line to those of all lines."""
         text, device = self._named(event.text, event.device)
         self._all.join(event._replace(text=text, device=device))
 
     def _named(self, text: str, device: int | None) -> tuple[str, int | None]:
-        """Text and device of an event as all lines have it."""
+        """Text and device of an event in the list of all lines."""
         if self._is_shown():
             return text, device
         if device is None:

@@ -1,4 +1,4 @@
-"""Monitor while its drive is not known yet: what is being done to get there."""
+"""Monitor while its drive is not known yet: the progress of opening it."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ DOING_LINES = 4
 
 
 def leave_opening(app: Panel) -> None:
-    """To Line, where it says why the drive that was named at the start is not shown."""
+    """Return to Line, which reports why the drive named at the start is not shown."""
     while any(isinstance(screen, OpeningScreen) for screen in app.screen_stack):
         app.pop_screen()
 
 
 class OpeningScreen(PanelScreen):
-    """The first picture where a drive was named at the start; Monitor takes its place."""
+    """The first screen if a drive was named at the start; Monitor replaces it."""
 
     BINDINGS: ClassVar = bindings(OPENING)
     TITLE = "Monitor"
@@ -42,7 +42,7 @@ class OpeningScreen(PanelScreen):
         self._device = device
 
     def body(self) -> Iterable[Widget]:
-        """One place, for a few words."""
+        """One place, for the progress."""
         doing = Lines(id="doing")
         doing.show(self._lines(self.app.size.width))
         yield doing
@@ -56,7 +56,7 @@ class OpeningScreen(PanelScreen):
         opened = self.app.line_label
         now = f"Drive {self._device} on {opened or self._line}"
         next_step = (
-            "It is asked which drive it is; then Monitor watches it."
+            "Identifying the drive. Monitor opens next."
             if opened
             else "Opening the line. Press Esc to cancel. Other keys are ignored."
         )
@@ -67,5 +67,5 @@ class OpeningScreen(PanelScreen):
 
     @property
     def name_of_screen(self) -> str:
-        """It has no drive, so the keys of Monitor mean nothing here."""
+        """Its own name: without a drive, the keys of Monitor do not work here."""
         return OPENING

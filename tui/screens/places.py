@@ -1,4 +1,4 @@
-"""Going from screen to screen: the keys that mean the same on every one of them."""
+"""Keys that work on every screen: they go from screen to screen, or open what a screen needs."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Places(Panel):
         return CONNECTION
 
     def show_monitor(self, console: DriveConsole) -> None:
-        """Show Monitor on a drive, in place of whatever is above the list of lines."""
+        """Show Monitor on a drive, instead of everything above Line."""
         from .monitor.screen import MonitorScreen
 
         log.info("watching device %s, %s", console.device, console.session.profile.id)
@@ -50,30 +50,30 @@ class Places(Panel):
             self.push_screen(MonitorScreen(console))
 
     def _choose(self, console: DriveConsole) -> None:
-        """This drive is the open one; the cursor of Line is on no other when one comes back."""
+        """Make a drive the open one; the cursor of Line goes to it, too."""
         self.chosen = console
         if (point_at := getattr(self.screen_stack[0], "point_at", None)) is not None:
             point_at(console.device)
 
     def _to_base(self) -> None:
-        """Back to the list of lines, whatever is above it."""
+        """Return to Line, and close everything above it."""
         while len(self.screen_stack) > 1:
             self.pop_screen()
 
     def action_goto(self, place: str) -> AwaitMount | None:
-        """Show a screen, on the drive that is open; awaited, so that the next key is its key."""
+        """Show a screen on the open drive; await it, so that the screen gets the next key."""
         if place == self.place:
             return None
         if place == CONNECTION:
             self._to_base()
         elif self.chosen is None:
-            self.tell("No drive is open yet: Enter on a drive of Line opens it.")
+            self.tell("No drive is open. Select a drive on Line and press Enter.")
         else:
             return self.show_place(place, self.chosen)
         return None
 
     def show_place(self, place: str, console: DriveConsole) -> AwaitMount | None:
-        """Show a screen of a drive, above its Monitor; callers that need it there await it."""
+        """Show a screen of a drive, above its Monitor; await it to use the screen."""
         from .monitor.screen import MonitorScreen
 
         registered = next(screen for screen in SCREENS if screen.name == place)
@@ -91,13 +91,13 @@ class Places(Panel):
         return shown
 
     def action_step_drive(self, step: int) -> None:
-        """The same screen of the next or previous drive found on the line."""
+        """Show the same screen for the next or previous drive found on the line."""
         consoles = self.fleet.consoles if self.fleet else []
         if self.chosen not in consoles:
-            self.tell("No drive is open yet: Enter on a drive of Line opens it.")
+            self.tell("No drive is open. Select a drive on Line and press Enter.")
             return
         if len(consoles) < 2:
-            self.tell("This is the only drive found on the line.")
+            self.tell("Only one drive was found on the line.")
             return
         place = self.place
         wanted = consoles[(consoles.index(self.chosen) + step) % len(consoles)]
@@ -110,7 +110,7 @@ class Places(Panel):
             self.show_place(place, wanted)
 
     async def action_find(self) -> None:
-        """Into the search for a parameter, from anywhere; what is typed next is searched for."""
+        """Go to the parameter search; what is typed next is searched for."""
         if shown := self.action_goto(PARAMETERS):
             await shown
         if self.chosen is not None:
@@ -126,41 +126,38 @@ class Places(Panel):
         self.screen.set_focus(None)
 
     def action_messages(self) -> None:
-        """Everything that was said."""
+        """Show all messages."""
         from .messages.screen import MessagesScreen
 
         if not isinstance(self.screen, MessagesScreen):
             self.push_screen(MessagesScreen())
 
     def action_wiring(self) -> None:
-        """The page of a family: of the drive under the cursor of Line, else of the open one."""
+        """Show Wiring for the drive under the cursor of Line, else for the open one."""
         if self.place == WIRING:
             return
         console = getattr(self.screen, "pointed", None) or self.chosen
         if console is None:
-            self.tell(
-                "No drive is here yet. Of any family:"
-                " drivepanel profiles ID --wiring, outside the panel."
-            )
+            self.tell("No drive is open. For any family, run: drivepanel profiles ID --wiring")
             return
         from .wiring.screen import WiringScreen
 
         self.push_screen(WiringScreen(console))
 
     def action_why(self) -> None:
-        """Why the drive that is meant does not answer."""
+        """Diagnose why the selected drive does not answer."""
         from .why import ask_why
 
         ask_why(self)
 
     def action_bundle(self) -> None:
-        """Collect all about a line in one file."""
+        """Collect everything about a line in one file."""
         from .bundle import ask_bundle
 
         ask_bundle(self)
 
     async def action_hear(self) -> None:
-        """Listen to a line on which another master asks."""
+        """Listen to a line that another master polls."""
         from .hear import LISTENS_ALREADY, NO_LINE, chosen_line, hear
 
         text, profile = chosen_line(self)
@@ -174,21 +171,21 @@ class Places(Panel):
 
     def action_save_shown(self) -> None:
         """Save what the screen shows to a file."""
-        self._ask_screen("action_save_file", "There is nothing to save on this screen.")
+        self._ask_screen("action_save_file", "This screen has nothing to save.")
 
     def action_open_file(self) -> None:
         """Open a file on the screen that can show it."""
-        self._ask_screen("action_load_file", "No file is opened on this screen.")
+        self._ask_screen("action_load_file", "This screen opens no files.")
 
     async def action_eeprom(self) -> None:
-        """Keep the settings of the open drive in its EEPROM."""
+        """Save the settings of the open drive to its EEPROM."""
         if shown := self.action_goto(PARAMETERS):
             await shown
         if self.chosen is not None:
             self._ask_screen("action_save_eeprom")
 
     def _ask_screen(self, action: str, otherwise: str = "") -> None:
-        """Let the screen on top do what the key means there."""
+        """Call this method of the screen on top; report `otherwise` if it has none."""
         work = getattr(self.screen, action, None)
         if work is not None:
             work()

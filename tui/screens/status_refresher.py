@@ -15,13 +15,13 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
 
 FRAME_LOOK, HEALTH_LOOK = 0.25, 1.0
-"""Seconds between two checks of the frame around every screen, and of the last minute of lines."""
+"""Seconds between two updates of the frame, and between two checks of the lines' last minute."""
 
-WHAT_TO_DO = "Open it: Space stops it, T takes it over."
+WHAT_TO_DO = "Open it, then press Space to stop it or T to take it over."
 
 
 class StatusRefresher(Panel):
-    """Draws the frame of the screen on top, and says what must be heard wherever one is."""
+    """Draws the frame of the screen on top, and reports faults and troubles on every screen."""
 
     bell_rings = True
     """True if a new fault rings."""
@@ -33,17 +33,17 @@ class StatusRefresher(Panel):
         """Urgent parts of the frame as last drawn."""
         self._drawn_at = 0.0
         self._keys_shown = ("", False)
-        """Target of the stop key at the last check, and whether other keys had none."""
+        """Label of the stop key at the last check, and True if a line was being opened then."""
         self._journal_trouble = ""
         self._left_behind_seen: set[DriveConsole] = set()
-        """Drives of which it was said that no program commands their motor."""
+        """Drives that were reported as running without a commander."""
         self._judged_at = -math.inf
-        """When the health of the lines was last judged, on the panel's clock."""
+        """When the health of the lines was last checked, on the panel's clock."""
 
     def look_around(self) -> None:
-        """Check what every screen shows: the frame with failed stops, and a new fault."""
+        """Update the frame, ring for a new fault, and report new troubles."""
         if not self.is_running:
-            return  # the panel ends: its screens are gone before its timers
+            return  # the panel ends: its screens are removed before its timers
         watches = [(fleet.alarms, fleet.line_watch) for fleet in self.fleets]
         new = [alarms.take(watch.states, watch.onsets.by_device) for alarms, watch in watches]
         if any(new) and self.bell_rings:
@@ -63,7 +63,7 @@ class StatusRefresher(Panel):
         return self._frame.view()
 
     def draw_frame(self) -> None:
-        """Put the frame of the screen on top as it is now; on a slow link its figures seldom."""
+        """Draw the frame of the screen on top; on a slow link its figures less often."""
         if not isinstance(self.screen, Framed):
             return
         keys_shown_now = self.stop_target_text, self.opening.goes_on
@@ -80,10 +80,10 @@ class StatusRefresher(Panel):
         self.screen.draw_frame(view)
 
     def _judge_lines(self) -> None:
-        """Say once of each trouble that the last minute of a line shows, and of its end."""
+        """Report once each trouble in the last minute of a line, and its end."""
         labels = {id(item.fleet): item.opened.label for item in self.panel_lines}
         for fleet in self.fleets:
-            # not among the events of the line: each program on it sees the same
+            # not shared with other programs: each of them reports it itself
             label = "" if fleet is self.fleet else f"{labels[id(fleet)]}: "
             health, line = fleet.health, fleet.line
             if line.state.status.value != "connected":
@@ -93,7 +93,7 @@ class StatusRefresher(Panel):
                 self.events.add(kind, f"{label}{text}")
 
     def _say_left_behind(self) -> None:
-        """Say once of a motor that its program has exited and that no program commands it."""
+        """Report once each running motor whose program has exited and that has no commander."""
         left = set()
         for fleet in self.fleets:
             for console in fleet.consoles:

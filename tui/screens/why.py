@@ -40,7 +40,7 @@ log = logging.getLogger(__name__)
 WHY_WIDTH, BESIDE_WHY = 76, 6
 """Columns of the dialog at most, and those of its border, its margin and its scroll bar."""
 SENTENCE_ROWS = 12
-LOOKING = "Listening, then reading the drive: 5 to 15 s, up to 30 s on a sick line ..."
+LOOKING = "Listening, then reading the drive: 5 to 15 s, up to 30 s on a poor line ..."
 BULLET = "· "
 WHY_KEYS = hint(("Esc", "Close"), ("N", "Repeat"), ("Up, Down", "Scroll"))
 
@@ -48,7 +48,7 @@ LooksWhy = Callable[[], Awaitable["Diagnosis"]]
 
 
 class WhyScreen(Framed, ModalScreen[None]):
-    """Results of a diagnosis; `look` runs when the screen opens, and again at N."""
+    """The result of a diagnosis; `look` runs when the dialog opens, and again at N."""
 
     CSS_PATH = "why.tcss"
     BINDINGS: ClassVar = [
@@ -72,7 +72,7 @@ class WhyScreen(Framed, ModalScreen[None]):
             yield Plain(WHY_KEYS, id="hint")
 
     def on_mount(self) -> None:
-        """Look at once."""
+        """Start the diagnosis."""
         self.action_again()
 
     def on_resize(self, _: Resize) -> None:
@@ -81,16 +81,16 @@ class WhyScreen(Framed, ModalScreen[None]):
             self._show()
 
     def action_again(self) -> None:
-        """Look once more."""
+        """Repeat the diagnosis."""
         self._found = None
         self._show()
         self.run_worker(self._ask(), exclusive=True, group="why", exit_on_error=False)
 
     def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
-        """An error that nobody foresaw ends the question, and not the panel."""
+        """Report an unexpected error; it closes the dialog, but not the panel."""
         if event.state is WorkerState.ERROR:
             log.error("looking for why failed", exc_info=event.worker.error)
-            self.app.events.add("error", f"The panel failed at this: {event.worker.error}")
+            self.app.events.add("error", f"Internal error: {event.worker.error}")
             self.dismiss(None)
 
     async def _ask(self) -> None:
@@ -131,7 +131,7 @@ def _listed(head: str, items: Iterable[str], width: int) -> Iterator[Text]:
 
 
 def ask_why(app: Panel) -> None:
-    """Look at the drive that is meant on Line, else at the open one, and show what fails."""
+    """Diagnose the drive selected on Line, else the open one, and show the failed check."""
     intended = getattr(app.screen, "why_target_now", None)
     target: WhyTarget | None = intended() if intended is not None else _open_drive(app)
     if target is None:
@@ -150,7 +150,7 @@ def ask_why(app: Panel) -> None:
 
 
 def _open_drive(app: Panel) -> WhyTarget | None:
-    """The drive that a screen is about, else the one that is open."""
+    """The drive of the screen on top, else the open one."""
     console: DriveConsole | None = getattr(app.screen, "console", None) or app.chosen
     if console is None or app.opened is None:
         return None
@@ -165,7 +165,7 @@ def _open_drive(app: Panel) -> WhyTarget | None:
 
 
 async def _kept(app: Panel, target: WhyTarget) -> Diagnosis:
-    """The diagnosis, which the drive keeps for its Wiring page."""
+    """Diagnose, and store the result for the drive's Wiring page."""
     found = await _looked(target)
     fleet = app.fleet
     console = fleet.console(target.device) if fleet is not None else None
@@ -175,7 +175,7 @@ async def _kept(app: Panel, target: WhyTarget) -> Diagnosis:
 
 
 async def _looked(target: WhyTarget) -> Diagnosis:
-    """Return the evidence, and the check that fails."""
+    """Collect the evidence, and find the check that fails."""
     from tui.session.diagnosis.asking import evidence_of_port, profile_remembered
     from tui.session.diagnosis.diagnosis import diagnosed
     from tui.session.diagnosis.examining import examine_line
@@ -202,4 +202,4 @@ def _profile(target: WhyTarget) -> Profile | None:
     try:
         return library.load(target.profile) if target.profile else None
     except DriveError:
-        return None  # told where it was typed
+        return None  # Line has reported it

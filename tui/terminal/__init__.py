@@ -1,1 +1,1 @@
-"""The terminal as the panel meets it: what its keys send, and Textual's private parts for that."""
+"""The terminal: reading its keys, drawing in few bytes, and the parts of Textual used for that."""

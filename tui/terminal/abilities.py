@@ -1,7 +1,7 @@
 """Abilities of the terminal: characters beyond ASCII, colors, erasing in color.
 
-The locale shows the signs, terminfo (or COLORTERM) the colors; nothing is asked of the terminal
-itself, which a slow link would have to answer first.
+The locale shows the characters, terminfo (or COLORTERM) the colors. The terminal itself is not
+asked, as its answer could take long on a slow link.
 """
 
 from __future__ import annotations
@@ -31,27 +31,27 @@ NAMED_COLORS: tuple[tuple[str, ColorSystem], ...] = (
     ("putty", ColorSystem.STANDARD),
     ("xterm", ColorSystem.STANDARD),
 )
-"""Colors by a part of TERM if the system does not know that terminal."""
+"""Colors by a part of TERM, for terminals that terminfo does not know."""
 
 WITHOUT_BRAILLE = ("linux", "cons25", "vt", "pcansi", "sco")
 """Beginnings of TERM of consoles whose fonts have no braille."""
 
 LOCALE = ("LC_ALL", "LC_CTYPE", "LANG")
-"""Variables with the encoding, the first that is set first."""
+"""Variables with the encoding; the first one that is set counts."""
 
 BEGINNING = Path("/proc/self/environ")
-"""The environment as the program was given it; Python changes LC_CTYPE where it is C or unset."""
+"""The environment at the start of the program; Python changes LC_CTYPE if it is C or unset."""
 
 
 class Abilities(NamedTuple):
     """Abilities of a terminal."""
 
     encoding: str = UTF_8
-    """Encoding of characters, by its Python name; missing ones become plain signs."""
+    """Python name of the character encoding; characters that it lacks become plain signs."""
     colors: ColorSystem | None = ColorSystem.TRUECOLOR
-    """None where there are none, or none are wanted."""
+    """None if the terminal has no colors, or none are wanted."""
     erases: bool = False
-    """True if it erases cells in the color that is set."""
+    """True if it erases cells in the current color."""
     braille: bool = True
     """True if its font has the dots of braille; those of text consoles have none."""
 
@@ -62,9 +62,10 @@ EVERYTHING: Final = Abilities()
 def abilities_of(
     environment: Mapping[str, str], *, written_as: str = UTF_8, ascii: bool | None = None
 ) -> Abilities:
-    """Return the abilities of this environment's terminal; Python writes to it in `written_as`.
+    """Return the abilities of this environment's terminal.
 
-    With `ascii` plain signs are used whatever the locale says, without them where it is False.
+    `written_as` is the encoding in which Python writes to it. `ascii` overrides the locale: True
+    for plain signs, False for all characters.
     """
     term = environment.get("TERM", "")
     known, erases = _terminfo(term)
@@ -76,7 +77,7 @@ def abilities_of(
 
 
 def fewer_colors(abilities: Abilities) -> Abilities:
-    """The same with sixteen colors at most: to set one of them takes half the bytes."""
+    """The same with sixteen colors at most: setting one of them takes half the bytes."""
     if abilities.colors in (None, ColorSystem.STANDARD):
         return abilities
     return abilities._replace(colors=ColorSystem.STANDARD)
@@ -85,10 +86,10 @@ def fewer_colors(abilities: Abilities) -> Abilities:
 def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:
     """The encoding of the locale, as Python names it.
 
-    ASCII if it shows none that is known, or if Python writes in another one.
+    ASCII if it names none that is known, or if Python writes in another one.
     """
     if sys.platform == "win32":
-        return UTF_8  # it has no locale of this kind, and consoles that know all signs
+        return UTF_8  # no such locale there, and its consoles have all characters
     reported = next((value for name in LOCALE if (value := environment.get(name))), "")
     name = reported.partition(".")[2].partition("@")[0] or reported
     try:
@@ -100,7 +101,7 @@ def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:
 
 
 def given_environment(environment: Mapping[str, str]) -> Mapping[str, str]:
-    """The environment with the locale as it was at the start of the program."""
+    """The environment, with the locale variables as at the start of the program."""
     try:
         lines = BEGINNING.read_bytes().split(b"\0")
     except OSError:
@@ -121,7 +122,7 @@ def _colors(environment: Mapping[str, str], term: str, known: int | None) -> Col
 
 
 def _terminfo(term: str) -> tuple[int | None, bool]:
-    """Return the number of colors of a terminal, and whether it erases in them; None if unknown."""
+    """Return a terminal's number of colors (None if unknown), and True if it erases in color."""
     try:
         import curses
     except ImportError:  # as on Windows

@@ -1,8 +1,8 @@
-"""Keys out of what terminals send: PuTTY in its modes, rxvt, consoles, tmux, screen, xterm.
+"""Keys from the sequences of terminals: PuTTY in its modes, rxvt, consoles, tmux, screen, xterm.
 
-A sequence that means a key gives that key, whole or cut anywhere; one that is not understood is
-swallowed whole. No stop key is lost in a sequence that does not end. Times are seconds of one
-clock, given with each read; nothing here looks at a clock.
+A sequence of a key yields that key, even if it arrives in parts. An unknown sequence is swallowed
+whole. No stop key is lost in a sequence without an end. The caller passes all times, in seconds of
+one clock.
 """
 
 from __future__ import annotations
@@ -33,16 +33,16 @@ from .tokens import (
 )
 
 ESCAPE_DELAY: Final = 0.1
-"""Seconds after which ESC alone is the key Escape, unless Textual is given another time."""
+"""Default seconds after which ESC alone is the key Escape; Textual's setting overrides it."""
 
 SEQUENCE_WITHIN: Final = 1.0
-"""Seconds that a sequence which has begun may wait for its next character."""
+"""Seconds that an unfinished sequence waits for its next character."""
 
 
 class Tokenizer:
-    """Takes what was read, piece by piece, and gives tokens.
+    """Splits input, read piece by piece, into tokens.
 
-    With `mouse` the terminal was asked to report its mouse and to speak the kitty protocol.
+    `mouse`: the terminal was asked for mouse reports and the kitty protocol.
     """
 
     def __init__(self, *, mouse: bool = False, escape_delay: float = ESCAPE_DELAY) -> None:
@@ -56,14 +56,15 @@ class Tokenizer:
         self._here: object = None
         self._alt = self._mute = False
         self._cut: tuple[Any, ...] | None = None
-        """A sequence in which another one began: where that is a report, the first goes on."""
+        """A sequence interrupted by another one; it continues if that one was a report."""
         self._late_until = self._late_before = float("-inf")
-        """Until when the rest of a sequence may come whose ESC was taken for the key Escape; and as
-        that was when the present sequence began, which may be a report that came between."""
+        """End of the time in which the rest of a sequence may follow an ESC that counted as the key
+        Escape; and that time as of the beginning of the present sequence, which may be a report in
+        between."""
         self._found: list[Token] = []
 
     def feed(self, text: str, now: float, mark: object = None) -> list[Token]:
-        """Take what was read at this time; its result."""
+        """Add what was read at this time, and return the finished tokens."""
         self._end_waiting(now)
         self._now, self._here = now, mark
         if not self._stops_inside(text):
@@ -79,12 +80,12 @@ class Tokenizer:
 
     @property
     def deadline(self) -> float | None:
-        """The time at which `tick` has something to do; None where nothing waits."""
+        """The time at which `tick` must be called; None if nothing waits."""
         return None if self._state == self._ground else self._last + self._patience
 
     @property
     def pending(self) -> float | None:
-        """When a sequence began that may become a key, or None."""
+        """When an unfinished sequence that may become a key began, or None."""
         may_be = self._state not in (self._ground, self._reply, self._paste)
         return self._began if may_be and not self._mute else None
 
@@ -98,13 +99,13 @@ class Tokenizer:
         return found
 
     def _begin(self, text: str = "", *, mute: bool = False) -> None:
-        """A key or a sequence begins with what is read now."""
+        """Begin a key or a sequence with the present read."""
         self._text, self._long = text, []
         self._began, self._mark = self._now, self._here
         self._alt, self._mute, self._cut = False, mute, None
 
     def _key(self, named: Named | None) -> None:
-        """Give a key out; the sequence that it came in is over."""
+        """Emit a key, and end its sequence."""
         self._state = self._ground
         if named is None or (self._mute and named[0] not in STOP_KEYS):
             return
@@ -117,11 +118,11 @@ class Tokenizer:
         self._found.append(KeyToken("escape", ESC, self._began, self._began, self._mark))
 
     def _ground(self, character: str) -> None:
-        """Nothing has begun: a key, or the first character of a sequence."""
+        """Outside a sequence: a key, or the first character of a sequence."""
         late, self._late_before = self._now <= self._late_until, self._late_until
         self._late_until = float("-inf")
         if late and character in "[O":
-            # the rest of a sequence whose ESC was taken for the key Escape
+            # the rest of a sequence whose ESC counted as the key Escape
             self._begin(ESC, mute=True)
             self._introduce(character)
         elif character == ESC:
@@ -154,7 +155,7 @@ class Tokenizer:
         self._state = states.get(character, self._opening)
 
     def _broken(self, character: str) -> bool:
-        """Return True if a character ends a sequence of keys that it cannot belong to."""
+        """Return True if a character cannot belong to the sequence, and so ends it."""
         if character == ESC or character in EIGHT_BIT:
             cut = self._state, self._text, self._began, self._mark, self._alt, self._mute
             self._ground(character)
@@ -197,15 +198,15 @@ class Tokenizer:
             self._finish()
 
     def _mouse_place(self, character: str) -> None:
-        """After ESC [ M where the mouse is reported: a button and a place."""
+        """After ESC [ M with mouse reports: a button and a position."""
         self._text += character
         if character == ESC or character in EIGHT_BIT:
-            self._ground(character)  # no button and no place: the rest of the report was lost
+            self._ground(character)  # the rest of the report was lost
         elif len(self._text) == len("\x1b[M") + 3:
             self._finish()
 
     def _finish(self) -> None:
-        """A sequence is complete."""
+        """Handle a complete sequence."""
         text, self._state = self._text, self._ground
         if text == PASTE_BEGINS:
             self._state = self._paste
@@ -219,10 +220,10 @@ class Tokenizer:
                 self._go_on()
 
     def _go_on(self) -> None:
-        """Continue the interrupted sequence, whole or late: the input was no key."""
+        """Continue the interrupted sequence: what interrupted it was not a key."""
         self._late_until = self._late_before
         if self._cut is not None:
-            # from its own last character on: reports come twice a second
+            # its timeout counts from its own last character: reports come twice a second
             *cut, self._last = self._cut
             (self._state, self._text, self._began, self._mark, self._alt, self._mute) = cut
             self._cut = None
@@ -237,7 +238,7 @@ class Tokenizer:
             self._state(character)
 
     def _reply(self, character: str) -> None:
-        """In a reply; what it says is not looked at."""
+        """In a reply, whose contents are ignored."""
         if character == ESC:
             self._began, self._mark = self._now, self._here
             self._state = self._reply_escape
@@ -252,7 +253,7 @@ class Tokenizer:
                 self._no_reply()
 
     def _reply_escape(self, character: str) -> None:
-        """After ESC in a reply: its end, or the first of another sequence."""
+        """After ESC in a reply: its end, or the beginning of another sequence."""
         if character == "\\":
             self._reply(REPLY_ENDS[0])
             return
@@ -262,13 +263,13 @@ class Tokenizer:
         self._escape(character)
 
     def _no_reply(self) -> None:
-        """Give up a reply without an end: a Space in it was typed."""
+        """Give up a reply without an end; a Space in it counts as typed."""
         spaced = " " in self._long
         self._begin()
         self._key(SPACE if spaced else None)
 
     def _paste(self, character: str) -> None:
-        """Inside of a paste."""
+        """Inside a paste."""
         self._long.append(character)
         if character == "~" and "".join(self._long[-len(PASTE_ENDS) :]) == PASTE_ENDS:
             self._pasted(self._long[: -len(PASTE_ENDS)])
@@ -279,10 +280,10 @@ class Tokenizer:
         self._state = self._ground
 
     def _stops_inside(self, text: str) -> bool:
-        """Return True if a read is a stop key alone that was pressed while something has no end.
+        """Return True if a read is a single stop key inside an unfinished paste or reply.
 
-        A Space read alone, a while after the rest, was pressed: if the end of a paste or of a reply
-        was lost, no stop may be lost with it.
+        A Space read alone, some time after the rest, was pressed. If the end of a paste or a reply
+        is lost, no stop may be lost with it.
         """
         if self._state not in (self._paste, self._reply) or self._now - self._last <= BURST_GAP:
             return False
@@ -293,7 +294,7 @@ class Tokenizer:
         return True
 
     def _end_waiting(self, now: float) -> None:
-        """End what has waited too long for its next character."""
+        """End a sequence that has waited too long for its next character."""
         if (deadline := self.deadline) is None or now < deadline:
             return
         state, self._state = self._state, self._ground
@@ -310,7 +311,7 @@ class Tokenizer:
             self._end_paste(now)
 
     def _end_paste(self, now: float) -> None:
-        """The end of a paste did not come in time; the first part of it may have."""
+        """End a paste without its end sequence; the first part of that sequence may have come."""
         whole = "".join(self._long)
         cut = next(n for n in range(len(PASTE_ENDS) - 1, -1, -1) if whole.endswith(PASTE_ENDS[:n]))
         self._pasted(self._long[: len(whole) - cut])

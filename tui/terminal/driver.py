@@ -1,8 +1,8 @@
-"""The driver of this platform, with keys read the panel's way.
+"""The driver of this platform, with the panel's own reading of keys.
 
-Textual hands keys to its event loop, which waits for the terminal whenever that takes no more
-bytes. The thread that reads the keys does not: there stop keys are recognized, and every key is
-given its stroke.
+Textual handles keys in its event loop, which blocks while the terminal accepts no output. The
+thread that reads the keys does not block: it recognizes stop keys, and attaches a stroke to every
+key.
 """
 
 from __future__ import annotations
@@ -35,10 +35,10 @@ if TYPE_CHECKING:
 
 
 def with_held_input(driver: type[Driver]) -> type[Driver]:
-    """Let a driver leave the screen without giving the terminal its attributes back."""
+    """Let a driver leave the screen without restoring the terminal's attributes."""
 
     class HoldingDriver(driver):  # type: ignore[valid-type, misc]
-        """Restores the terminal's attributes with the screen, or later if they are held."""
+        """Restores the terminal's attributes when it leaves the screen, or later if held."""
 
         def __init__(self, app: Any, **settings: Any) -> None:
             self._held = False
@@ -60,7 +60,7 @@ def with_held_input(driver: type[Driver]) -> type[Driver]:
                     self.release_input()
 
         def hold_input(self) -> None:
-            """Keep typed keys without echo and signals until `release_input`; in any thread."""
+            """Keep echo and key signals off until `release_input`; in any thread."""
             self._held = True
 
         def release_input(self) -> None:
@@ -76,7 +76,7 @@ def with_held_input(driver: type[Driver]) -> type[Driver]:
                 termios.tcsetattr(self.fileno, termios.TCSANOW, before)
 
         def close(self) -> None:
-            """End all writing; while the input is held, there is more to write."""
+            """End all writing; not while the input is held, as more is still to be written."""
             if not self._held:
                 super().close()
 
@@ -86,24 +86,24 @@ def with_held_input(driver: type[Driver]) -> type[Driver]:
 log = logging.getLogger(__name__)
 
 END_POLL_INTERVAL = 0.1
-"""Seconds between two looks whether the panel is to end."""
+"""Seconds between two checks if the panel must end."""
 
 READ_SIZE = 4096
-"""Bytes that are read in one go."""
+"""Bytes of one read at most."""
 
 POSIX = "LinuxDriver"
-"""Textual's driver of every system that has pseudo-terminals."""
+"""Name of Textual's driver for every system with pseudo-terminals."""
 
 ASK_FOR_FOCUS = "\x1b[?1004h"
 NO_REPORTS = "\x1b[?1000l\x1b[?1002l\x1b[?1003l\x1b[?1006l\x1b[?1004l"
-"""A program that died may have left the mouse reported: a click would be typed, a Space with it."""
+"""Ends mouse reports that a crashed program left on: a click would type keys, even a Space."""
 
-UNASKED = ("\x1b[>", "\x1b[<u", "\x1b]22;")
-"""Sequences that begin and end the kitty keyboard protocol and change the mouse pointer."""
+NEVER_SENT = ("\x1b[>", "\x1b[<u", "\x1b]22;")
+"""Sequences of Textual that are dropped: for the kitty keyboard protocol and the mouse pointer."""
 
 
 FULL_SCREEN = "\x1b[?1049h\x1b[?25l\x1b[?7l"
-"""The other page of the terminal, without a cursor and without wrapping."""
+"""The alternate page of the terminal, without a cursor and without wrapping."""
 
 
 class WithMouse(Protocol):
@@ -114,7 +114,7 @@ class WithMouse(Protocol):
 
 
 class Fails(Protocol):
-    """An app that the thread of the keys can end when it cannot go on."""
+    """An app that the key-reading thread can end after an error."""
 
     def end_by(self, error: BaseException) -> None:
         """End the app because of an error."""
@@ -124,7 +124,7 @@ class Drawing(Protocol):
     """Messages of the driver to the app, in the app's loop."""
 
     def picture_taken(self, at: float) -> None:
-        """The terminal has drawn a frame, and said so at this time."""
+        """Note that the terminal reported at this time that it drew a frame."""
 
     def action_redraw(self) -> None:
         """Draw the whole screen again."""
@@ -132,14 +132,14 @@ class Drawing(Protocol):
 
 @lru_cache(maxsize=1)
 def with_own_keys(driver: type[Driver]) -> type[Driver]:
-    """The driver of this platform, asking for less and reading keys the panel's way."""
+    """The driver of this platform, with fewer requests to the terminal and the panel's keys."""
     quiet = _quiet(_giving_back(with_held_input(driver)))
     return _reading(quiet) if driver.__name__ == POSIX else _stopping(quiet)
 
 
 def _giving_back(driver: type[Driver]) -> type[Driver]:
     class GivingBackDriver(driver):  # type: ignore[valid-type, misc]
-        """Leaves the screen once, from any thread; what is drawn after that is dropped."""
+        """Leaves the screen once, from any thread; later output is dropped."""
 
         def __init__(self, app: Any, **settings: Any) -> None:
             self._gate = threading.RLock()
@@ -167,7 +167,7 @@ def _giving_back(driver: type[Driver]) -> type[Driver]:
                 self._left = True
 
         def say_below(self, text: str) -> None:
-            """Write a line on the terminal once the screen was left; in any thread."""
+            """Write a line on the terminal after the screen was left; in any thread."""
             with self._gate:
                 super().write(f"{text}\n")
 
@@ -176,19 +176,19 @@ def _giving_back(driver: type[Driver]) -> type[Driver]:
 
 def _quiet(driver: type[Driver]) -> type[Driver]:
     class QuietDriver(driver):  # type: ignore[valid-type, misc]
-        """Asks a terminal for its mouse and the kitty protocol only where the app says so."""
+        """Requests mouse reports and the kitty protocol only if the app wants the mouse."""
 
         def __init__(self, app: Any, *, mouse: bool = True, **settings: Any) -> None:
             self.wanted = mouse and cast("WithMouse", app).mouse
             super().__init__(app, mouse=self.wanted, **settings)
 
         def write(self, data: str) -> None:
-            if not self.wanted and data.startswith(UNASKED):
+            if not self.wanted and data.startswith(NEVER_SENT):
                 return
             super().write(NO_REPORTS if data == ASK_FOR_FOCUS and not self.wanted else data)
 
         def process_message(self, message: Message) -> None:
-            """Handle a cursor report, which only shows what the terminal has drawn."""
+            """Handle a cursor report, which shows that the terminal drew a frame."""
             if isinstance(message, events.CursorPosition):
                 drawing = cast("Drawing", self._app)
                 soon_in_loop(self._app, drawing.picture_taken, time.monotonic())
@@ -234,15 +234,15 @@ def _reading(driver: type[Driver]) -> type[Driver]:
 
 
 class TerminalGone(Exception):
-    """The terminal that keys were read from is there no more."""
+    """The terminal that keys are read from no longer exists."""
 
 
 def read_keys(driver: Any) -> None:
     """Read the keys of a driver's terminal until its panel ends.
 
-    Where the terminal goes away the panel is given SIGHUP: the system gives it to the program
-    that leads the terminal's session alone, and that may be another, which goes on. An error here
-    ends the panel: no key would stop a motor any more.
+    If the terminal disappears, the panel gets SIGHUP from here: the system sends it only to the
+    leader of the terminal's session, which may be another program that continues. An error here
+    ends the panel, because no key could stop a motor any more.
     """
     try:
         _read_keys(driver)
@@ -267,12 +267,12 @@ def _read_keys(driver: Any) -> None:
                 except Exception:
                     # the next key may be a stop
                     log.exception("a key was lost")
-        if selector.select(0):  # what is typed while the panel ends is for nobody
+        if selector.select(0):  # discard what is typed while the panel ends
             os.read(driver.fileno, READ_SIZE)
 
 
 def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[TerminalInput]:
-    """Wait for bytes, or until something is known without."""
+    """Wait for bytes or a deadline, and return the input known then."""
     requested, deadline = time.monotonic(), keys.deadline
     wait = (
         END_POLL_INTERVAL
@@ -281,8 +281,8 @@ def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[Terminal
     )
     if not selector.select(wait):
         return keys.tick(time.monotonic())
-    # Where this thread was kept waiting, the bytes were there before now. The stamp comes before
-    # the bytes: where a stop of somebody else falls between, it voids them.
+    # If this thread was delayed, the bytes arrived before now. The stamp is taken before the bytes
+    # are read: a stop by another source in between discards them.
     now, stamp = min(time.monotonic(), requested + wait), cast("Stops", driver._app).stop_stamp()
     return keys.read(_typed(driver), now, stamp)
 
@@ -326,8 +326,9 @@ def _messages(read: TerminalInput, reports: XTermParser) -> Iterator[Message]:
 
 def _stopping(driver: type[Driver]) -> type[Driver]:
     class StoppingDriver(driver):  # type: ignore[valid-type, misc]
-        """Driver for systems where Textual reads the keys itself, as on Windows: only stop keys
-        are taken early."""
+        """Driver for systems where Textual reads the keys, such as Windows.
+
+        Only stop keys are handled early."""
 
         def process_message(self, message: Message) -> None:
             if isinstance(message, events.Key):

@@ -1,7 +1,7 @@
-"""Terminals with few colors or signs: the same state, by what there is.
+"""Styles and signs for terminals with few colors or characters.
 
-Without colors what has a color behind it is shown in reverse, and what is bold stays so; words and
-signs show the state in any case.
+Without colors, a colored background is shown in reverse, and bold text stays bold. Words and signs
+show the state in any case.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from textual.color import Color
 from textual.filter import LineFilter
 
 RAISED_FROM = 0.21
-"""Brightness of a background, from 0 to 1, from which it no longer belongs to the calm ground."""
+"""Brightness of a background, from 0 to 1, from which it counts as highlighted."""
 
 SUNK_TO = 0.09
-"""Brightness up to which a background is darker than the ground: a field to type in."""
+"""Brightness up to which a background is darker than the screen's: an input field."""
 
 BRIGHT_FROM = 0.5
-"""Brightness from which a color of words is one of the brighter eight."""
+"""Brightness from which a text color becomes one of the brighter eight."""
 
 BLACK, BLUE, WHITE = 0, 4, 15
 
 LEAST_DIFFERENCE = 60
-"""Difference between the strongest and the weakest part of a color, of 255, up to which it is a
+"""Difference between the strongest and the weakest part of a color, of 255, below which it is
 gray."""
 
-GREYS: tuple[tuple[float, int], ...] = ((0.25, 0), (0.42, 8), (0.75, 7), (1.01, 15))
-"""Up to which brightness a gray is which of the sixteen: ground, rules, words, emphasis."""
+GRAYS: tuple[tuple[float, int], ...] = ((0.25, 0), (0.42, 8), (0.75, 7), (1.01, 15))
+"""Brightness limits, and the color of the sixteen below each: ground, rules, text, emphasis."""
 
 
 class NoColors(LineFilter):
@@ -61,7 +61,7 @@ class SixteenColors(LineFilter):
 
 @lru_cache(maxsize=1024)
 def without_colors(style: Style) -> Style:
-    """Bold, underlined and reversed, for what was colored."""
+    """The style in bold, underline and reverse instead of colors."""
     behind = style.bgcolor
     colored = behind is not None and _brightness(behind) >= RAISED_FROM
     return Style(
@@ -74,7 +74,7 @@ def without_colors(style: Style) -> Style:
 
 @lru_cache(maxsize=1024)
 def in_sixteen(style: Style) -> Style:
-    """The style with the nearest of sixteen colors; words are never of the color behind them."""
+    """The style in the nearest of sixteen colors; text never has the color of its background."""
     front, behind = _words(style.color), _ground(style.bgcolor)
     if front is not None and behind is not None and front.number == behind.number:
         front = RichColor.from_ansi(WHITE if behind.number in (BLACK, BLUE) else BLACK)
@@ -83,31 +83,31 @@ def in_sixteen(style: Style) -> Style:
 
 
 def _words(color: RichColor | None) -> RichColor | None:
-    """The color of words."""
-    if color is None or _is_one_of_them(color):
+    """The color of text."""
+    if color is None or _is_standard(color):
         return color
     bright = _brightness(color)
-    if _is_grey(color):
-        return RichColor.from_ansi(next(number for most, number in GREYS if bright <= most))
+    if _is_gray(color):
+        return RichColor.from_ansi(next(number for most, number in GRAYS if bright <= most))
     number = color.downgrade(ColorSystem.STANDARD).number or 0
     return RichColor.from_ansi(number + 8 if number < 8 and bright >= BRIGHT_FROM else number)
 
 
 def _ground(color: RichColor | None) -> RichColor | None:
-    """The color behind words: one of the first eight, as terminals blink with the others."""
-    if color is None or _is_one_of_them(color):
+    """The background color: one of the first eight, as some terminals blink with the others."""
+    if color is None or _is_standard(color):
         return color
     number = (color.downgrade(ColorSystem.STANDARD).number or 0) % 8
-    if _is_grey(color) or number == BLACK:
+    if _is_gray(color) or number == BLACK:
         number = BLUE if _brightness(color) >= RAISED_FROM else BLACK
     return RichColor.from_ansi(number)
 
 
-def _is_one_of_them(color: RichColor) -> bool:
+def _is_standard(color: RichColor) -> bool:
     return color.type in (ColorType.DEFAULT, ColorType.STANDARD)
 
 
-def _is_grey(color: RichColor) -> bool:
+def _is_gray(color: RichColor) -> bool:
     parts = color.get_truecolor()
     return max(parts) - min(parts) < LEAST_DIFFERENCE
 
@@ -154,7 +154,7 @@ PLAIN_SIGNS: Final = {
 
 
 class PlainSigns(LineFilter):
-    """Replaces what cannot be written in an encoding, one for one."""
+    """Replaces characters that an encoding lacks, one for one."""
 
     def __init__(self, encoding: str) -> None:
         super().__init__()
@@ -172,7 +172,7 @@ class PlainSigns(LineFilter):
 
 @lru_cache(maxsize=2048)
 def in_encoding(text: str, encoding: str) -> str:
-    """A text with a plain sign for each character that an encoding lacks; as wide as it was."""
+    """A text with a plain sign for each character that an encoding lacks; its width is kept."""
     return "".join(_sign(character, encoding) for character in text)
 
 

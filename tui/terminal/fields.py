@@ -1,18 +1,18 @@
-"""Use of text by a focused widget: none, numbers, or any text, spaces too.
+"""Kind of text that the focused widget accepts: none, numbers, or any text with spaces.
 
-A widget says it by `takes_text` and `takes_space`; of Textual's own it is known.
+A widget declares it by `takes_text` and `takes_space`; Textual's own widgets are known.
 """
 
 from __future__ import annotations
 
 from textual.widget import Widget
 
-# by their names: to import a text area takes longer than the whole first picture may
+# by name: importing a text area would take longer than the first picture may
 TEXT_FIELDS = frozenset({"Input", "TextArea"})
 
 
 def takes_text(widget: Widget | None) -> bool:
-    """Return True if what is typed becomes text in this widget."""
+    """Return True if typed characters become text in this widget."""
     reported = getattr(widget, "takes_text", None)
     if reported is not None:
         return bool(reported)
@@ -20,7 +20,7 @@ def takes_text(widget: Widget | None) -> bool:
 
 
 def takes_space(widget: Widget | None) -> bool:
-    """Return True if a space is text in this widget; in a field for numbers it is none."""
+    """Return True if a space is text in this widget; False in a field for numbers."""
     reported = getattr(widget, "takes_space", None)
     if reported is not None:
         return bool(reported)

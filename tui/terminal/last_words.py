@@ -1,7 +1,7 @@
-"""The end of the panel by an error of its own: motors first, then one sentence, no traceback.
+"""The end of the panel after an internal error: stop motors first, then one sentence, no traceback.
 
 The last work is ordered in the thread that met the error, before anything is drawn, closed or
-logged. Neither a loop that hangs nor a terminal that takes nothing holds it up.
+logged. Neither a hanging loop nor a blocked terminal delays it.
 """
 
 from __future__ import annotations
@@ -29,37 +29,37 @@ from .loop import soon_in_loop
 log = logging.getLogger(__name__)
 
 ENDED_WITHIN = 3.0
-"""Seconds that the app has to end after its last work; then the process is ended."""
+"""Seconds for the app to end after its last work; then the process exits."""
 TAKEN_BY_TERMINAL_WITHIN = 1.0
-"""Seconds for which the end waits until the terminal has taken the last words."""
+"""Seconds that the end waits for the terminal to accept the last words."""
 FAILED = 70
 """The exit status after an internal error, as of any command."""
 TRIES, TRIED_AGAIN = 5, 0.2
-"""Number of attempts at the last work after errors, and the delay between them."""
-NOT_ORDERED = "NOT STOPPED: motors that were started here may run on. Stop them at the machine."
+"""Number of attempts at the last work after errors, and the seconds between them."""
+NOT_ORDERED = "NOT STOPPED: motors started here may still run. Stop them at the machine."
 END_NOT_SEEN = "It is not known whether the motors stopped. Check them at the machine."
 
 
 class LastWork(Protocol):
-    """Work that was ordered because the panel ends."""
+    """Work ordered because the panel ends: stops of motors."""
 
     @property
     def begun(self) -> str:
         """The work in progress, for a person."""
 
     def follow(self) -> str:
-        """Wait for its end; the result, for a person."""
+        """Wait for its end, and return the result for a person."""
 
 
 @runtime_checkable
 class OwnScreen(Protocol):
-    """A driver that gives the terminal back at once, in any thread."""
+    """A driver that can restore the terminal immediately, from any thread."""
 
     def stop_application_mode(self) -> None:
         """Leave the screen; later pictures are dropped."""
 
     def say_below(self, text: str) -> None:
-        """Write a line on the terminal that was given back."""
+        """Write a line on the restored terminal."""
 
     def hold_input(self) -> None:
         """Keep typed keys without echo and signals, also after the screen was left."""
@@ -69,18 +69,18 @@ class OwnScreen(Protocol):
 
 
 class LastWords(App[None]):
-    """An app that orders its last work before all else when an error ends it."""
+    """An app that, if an error ends it, first orders its last work."""
 
     def __init__(self) -> None:
         super().__init__()
         self._workers = _Workers(self, self._begin_end)
         self._failing = threading.Lock()
-        """Taken by the first error, for good."""
+        """Acquired by the first error, and never released."""
         self._work: LastWork | None = None
         self._following: threading.Thread | None = None
         """Follows the last work after an error; the process does not end before it."""
         self._saying: threading.Thread | None = None
-        """Says the last words; alone, as long as it lives."""
+        """Writes the last words; while it runs, no other thread writes them."""
         self._followed = threading.Event()
         self._unsaid: list[str] = []
 
@@ -98,7 +98,7 @@ class LastWords(App[None]):
         soon_in_loop(self, self.exit, None, FAILED)
 
     def run(self, **settings: Any) -> Any:
-        """Run the app; an error of its own ends it with `FAILED`, and is not raised."""
+        """Run the app; an internal error ends it with `FAILED`, and is not raised."""
         result = None
         try:
             result = super().run(**settings)
@@ -117,12 +117,12 @@ class LastWords(App[None]):
         return self._failing.locked()
 
     def release_input(self) -> None:
-        """Release the input that an error has left held; in any thread."""
+        """Release the input if it is still held after an error; in any thread."""
         if self.failed and isinstance(self._driver, OwnScreen):
             self._driver.release_input()
 
     def _finish(self) -> None:
-        """See the end through, also if a second error interrupted it."""
+        """Complete the end, even if a second error interrupted it."""
         if self._following is None:
             self._follow()
         else:
@@ -133,7 +133,7 @@ class LastWords(App[None]):
             self._driver.close()  # writes what is still queued
 
     def follow_last_work(self) -> None:
-        """Wait for the end of the last work; orders it where that was not done yet."""
+        """Wait for the end of the last work; order it first if that was not done."""
         if self._following is not None:
             self._following.join()
         elif (work := self._work or self._ordered()) is not None:
@@ -165,7 +165,7 @@ class LastWords(App[None]):
             self._work = self._ordered()
 
     def _loop_met(self, _loop: asyncio.AbstractEventLoop, context: dict[str, Any]) -> None:
-        """An error in a callback of the loop ends the panel; one of a lost task is on record."""
+        """End the panel after an error in a loop callback; only log an error of a lost task."""
         error = context.get("exception")
         if isinstance(error, Exception) and "handle" in context and self.is_running:
             self._handle_exception(error)
@@ -173,7 +173,7 @@ class LastWords(App[None]):
             log.error("%s", context.get("message"), exc_info=error)
 
     def _begin_end(self, error: BaseException) -> None:
-        """Order the last work, and let nothing hold it up; for the first error only."""
+        """Order the last work without any delay; for the first error only."""
         if not self._failing.acquire(blocking=False):
             log.error("another error while the panel ends", exc_info=error)
             return
@@ -204,7 +204,7 @@ class LastWords(App[None]):
             return None
 
     def _follow(self) -> None:
-        """See the last work to its end; then the app may end, and has to soon."""
+        """Wait for the end of the last work; then the app must end within `ENDED_WITHIN`."""
         for _ in range(TRIES):
             if self._work is not None:
                 break
@@ -227,7 +227,7 @@ class LastWords(App[None]):
         self.release_input()
 
     def _say_all(self, screen: OwnScreen) -> None:
-        """Give the terminal back, and say all there; in a thread, as it may take nothing."""
+        """Restore the terminal and write everything there; in a thread, as it may block."""
         screen.stop_application_mode()
         self._say(screen)
         self._followed.wait()
@@ -239,7 +239,7 @@ class LastWords(App[None]):
             del self._unsaid[0]
 
     def _print_error_renderables(self) -> None:
-        """Say what could not be said before."""
+        """Print what could not be written before."""
         if self._saying is None or not self._saying.is_alive():
             for text in self._unsaid:
                 self.error_console.print(Text(text))
@@ -248,7 +248,7 @@ class LastWords(App[None]):
 
 
 class _Workers(WorkerManager):
-    """Workers whose errors are reported at once: Textual first takes a traceback for its log."""
+    """Workers whose errors are reported immediately: Textual would first format a traceback."""
 
     def __init__(self, app: App[None], failed: Callable[[BaseException], None]) -> None:
         super().__init__(app)
@@ -273,7 +273,7 @@ class _Workers(WorkerManager):
 def _started(
     work: Callable[[], None], name: str, *, daemon: bool = False
 ) -> threading.Thread | None:
-    """A thread at work; None where there is no memory for one."""
+    """Start a thread; None if there is no memory for it."""
     thread = threading.Thread(target=work, name=name, daemon=daemon)
     try:
         thread.start()
@@ -283,7 +283,7 @@ def _started(
 
 
 def _log_strays() -> None:
-    """Keep errors that nobody awaits off the terminal, and on record, until the process ends."""
+    """Log errors that no code awaits, instead of printing them on the terminal."""
 
     def in_thread(met: threading.ExceptHookArgs) -> None:
         log.error("error in the thread %s", met.thread and met.thread.name, exc_info=met.exc_value)

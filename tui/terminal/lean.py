@@ -1,9 +1,9 @@
-"""Wanted and present contents of the terminal; only the cells that differ are sent.
+"""Intended and present contents of the terminal; only cells that differ are sent.
 
-Textual 8.2 sends a changed part of a widget from its left edge on, a new screen as a whole and
-several times over, and sets every color again for each piece of text; over a slow link that is most
-of what a panel sends. Here its updates come together in one picture, and what goes to the terminal
-is the difference at the moment at which the terminal can take it.
+Textual 8.2 sends a changed part of a widget from its left edge on, and a new screen whole, several
+times. It sets every color again for each piece of text. On a slow link that is most of what a panel
+sends. Here the updates are merged into one picture. When the terminal can accept output, only the
+difference is sent.
 """
 
 from __future__ import annotations
@@ -23,17 +23,17 @@ from tui.drive.plain import commands
 
 RESET = "0"
 NOT_BOLD = "22"
-SEEN_ON_SIGNS = frozenset({"1", "2", "3"})
-"""Bold, dim, italic: a blank looks the same with them."""
+INVISIBLE_ON_BLANKS = frozenset({"1", "2", "3"})
+"""Bold, dim, italic: a blank looks the same with or without them."""
 FOREGROUND = frozenset({*range(30, 38), *range(90, 98)})
 BACKGROUND = frozenset({*range(40, 48), *range(100, 108)})
 EXTENDED = {38: "foreground", 48: "background"}
 NUMBERS = {2: 5, 5: 3}
-"""Numbers of an extended color in all, by the one that follows 38 or 48."""
+"""Count of numbers in an extended color, by the number after 38 or 48."""
 
 
-class CellLook(NamedTuple):
-    """Attributes and colors of a character; a color that is empty is the terminal's own."""
+class CellStyle(NamedTuple):
+    """Attributes and colors of a character; an empty color is the terminal's default."""
 
     attributes: frozenset[str] = frozenset()
     foreground: str = ""
@@ -41,8 +41,8 @@ class CellLook(NamedTuple):
 
 
 @lru_cache(maxsize=1024)
-def look_of(ansi: str) -> CellLook:
-    """Return the look of a style such as `1;38;5;7;48;5;0`."""
+def cell_style(ansi: str) -> CellStyle:
+    """Parse a style such as `1;38;5;7;48;5;0`."""
     attributes, colors = set(), {"foreground": "", "background": ""}
     left = ansi.split(";") if ansi else []
     while left:
@@ -58,37 +58,39 @@ def look_of(ansi: str) -> CellLook:
         elif number not in (39, 49):
             attributes.add(left[0])
         left = left[size:]
-    return CellLook(frozenset(attributes), **colors)
+    return CellStyle(frozenset(attributes), **colors)
 
 
 @lru_cache(maxsize=4096)
 def change(before: str, after: str) -> str:
-    """The shortest sequence from one style to another; nothing where they are the same."""
+    """The shortest sequence from one style to another; empty if they are the same."""
     if before == after:
         return ""
-    was, now = look_of(before), look_of(after)
-    anew = f"\x1b[{RESET};{after}m" if after else f"\x1b[{RESET}m"
-    gone = was.attributes - now.attributes
-    color_gone = (was.foreground and not now.foreground) or (was.background and not now.background)
-    if color_gone or not gone <= {"1"}:
-        return anew
-    added = [NOT_BOLD] if gone else []
-    kept = was.attributes - {"2"} if gone else was.attributes  # not bold is not dim either
+    was, now = cell_style(before), cell_style(after)
+    from_reset = f"\x1b[{RESET};{after}m" if after else f"\x1b[{RESET}m"
+    dropped = was.attributes - now.attributes
+    default_color = (was.foreground and not now.foreground) or (
+        was.background and not now.background
+    )
+    if default_color or not dropped <= {"1"}:
+        return from_reset
+    added = [NOT_BOLD] if dropped else []
+    kept = was.attributes - {"2"} if dropped else was.attributes  # NOT_BOLD ends dim, too
     added += sorted(now.attributes - kept)
     added += [now.foreground] if now.foreground != was.foreground else []
     added += [now.background] if now.background != was.background else []
-    return min(f"\x1b[{';'.join(added)}m" if added else "", anew, key=len)
+    return min(f"\x1b[{';'.join(added)}m" if added else "", from_reset, key=len)
 
 
 def erasable(ansi: str) -> bool:
     """Return True if a blank of this style looks like an erased cell."""
-    return look_of(ansi).attributes <= SEEN_ON_SIGNS
+    return cell_style(ansi).attributes <= INVISIBLE_ON_BLANKS
 
 
 @lru_cache(maxsize=1024)
 def blank_style(ansi: str) -> str:
-    """The style of a blank without what is seen on signs only."""
-    return look_of(ansi).background if erasable(ansi) else ansi
+    """The style of a blank, without attributes that a blank does not show."""
+    return cell_style(ansi).background if erasable(ansi) else ansi
 
 
 def same_blank(before: str, after: str) -> bool:
@@ -97,26 +99,25 @@ def same_blank(before: str, after: str) -> bool:
 
 
 Cell = tuple[str, str]
-"""A character and its colors; none where the one to the left takes two cells."""
+"""A character and its colors; an empty character if the one to the left is two cells wide."""
 
 Placed = tuple[int, int, Strip]
 """A strip at a column and a row."""
 
 CURSOR_MOVE = 8
-"""Bytes that moving the cursor takes: cells that stay the same between others are sent again."""
+"""Bytes of a cursor movement: a shorter run of unchanged cells is sent again instead."""
 
 ERASE = 5
-"""Bytes that erasing cells takes."""
+"""Bytes of an erase command."""
 
 FIRST_ROWS, LAST_ROWS = 2, 2
-"""Rows at the top and at the bottom that are drawn first: what the motor does and where the keys
-lead, message and keys."""
+"""Rows at the top (status bar, tabs) and at the bottom (message, key bar) that are drawn first."""
 
 
 class Picture:
-    """Wanted contents of the terminal, and its present ones as far as the frames show.
+    """Intended contents of the terminal, and its present contents according to the frames sent.
 
-    With `erases` the terminal erases cells in the color that is set.
+    `erases`: the terminal erases cells in the current color.
     """
 
     def __init__(self, *, erases: bool = False) -> None:
@@ -127,21 +128,21 @@ class Picture:
 
     @property
     def is_shown(self) -> bool:
-        """True if the terminal shows all that it is to show."""
+        """True if the terminal shows all intended contents."""
         return not self._changed
 
     def forget(self) -> None:
-        """The terminal may show something else: others have written to it."""
+        """Assume nothing about the terminal's contents: another program may have written to it."""
         self._shown.clear()
         self._changed = {y: (0, len(row)) for y, row in self._wanted.items()}
 
     def clear(self) -> None:
-        """The terminal has another size: its contents are sent again."""
+        """Start again after a change of the terminal's size."""
         self._wanted.clear()
         self.forget()
 
     def want(self, strips: Sequence[Placed], colors: ColorSystem) -> None:
-        """Take strips that are to be shown from now on."""
+        """Add strips to the intended contents."""
         for x, y, strip in strips:
             cells = cells_of(strip, colors)
             end = x + len(cells)
@@ -152,10 +153,10 @@ class Picture:
             self._changed[y] = min(first, x), max(last, end)
 
     def frame(self, room: int) -> str:
-        """Return the output for the terminal, which shows it from then on.
+        """Return the output for the terminal, and count it as shown.
 
-        It ends with the row in which it gets longer than `room` bytes. Rows come in the order in
-        which a person needs them: the first ones, the last ones, then from the top.
+        It ends with the row in which it exceeds `room` bytes. The first and the last rows come
+        first, then the others from the top.
         """
         pen = Pen(erases=self._erases)
         for y in self._in_order():
@@ -169,7 +170,7 @@ class Picture:
         return sorted(self._changed, key=lambda y: (FIRST_ROWS <= y <= bottom, y))
 
     def _draw(self, pen: Pen, y: int) -> None:
-        """Write what differs in a row."""
+        """Write the differing cells of a row."""
         first, last = self._changed.pop(y)
         wanted = self._wanted[y]
         shown = self._shown.setdefault(y, [])
@@ -182,7 +183,7 @@ class Picture:
 def different(
     shown: Sequence[Cell | None], wanted: Sequence[Cell | None], first: int, last: int
 ) -> list[tuple[int, int]]:
-    """The runs of cells of a row that must be sent; a wide character is sent as a whole."""
+    """The runs of cells of a row that must be sent; a wide character is sent whole."""
     found: list[tuple[int, int]] = []
     for place in range(first, last):
         cell = wanted[place]
@@ -198,13 +199,13 @@ def different(
 
 
 def screen_text(screen: Screen[Any]) -> str:
-    """A screen as text, a line for each of its rows, as it was drawn last."""
+    """A screen as text, one line per row, as it was last drawn."""
     rows = (strip.text.rstrip() for strip in screen._compositor.render_strips())
     return "\n".join([*rows, ""])
 
 
 def strips_of(update: RenderableType | None) -> list[Placed] | None:
-    """The strips of an update of Textual's; None for anything else."""
+    """The strips of a Textual update; None for any other renderable."""
     if isinstance(update, ChopsUpdate):
         return list(_span_places(update))
     if isinstance(update, LayoutUpdate):
@@ -255,9 +256,9 @@ def cells_of(strip: Strip, colors: ColorSystem) -> list[Cell]:
 
 
 class Pen:
-    """Writes cells; moves and changes color only where it has to.
+    """Writes cells; moves the cursor and changes the color only if necessary.
 
-    With `erases` the terminal erases cells in the color that is set.
+    `erases`: the terminal erases cells in the current color.
     """
 
     def __init__(self, *, erases: bool = False) -> None:
@@ -269,7 +270,7 @@ class Pen:
         """Characters written so far; nearly all of them take one byte."""
 
     def write(self, x: int, y: int, cells: Sequence[Cell | None]) -> None:
-        """Write cells from a place on."""
+        """Write cells from this column and row on."""
         if self._at != (x, y):
             self._put(f"\x1b[{y + 1};{x + 1}H")
         place, moved = 0, True
@@ -286,7 +287,7 @@ class Pen:
         self._at = (x + len(cells), y) if moved else None
 
     def _blank(self, cells: Sequence[Cell | None], place: int) -> int:
-        """Return the number of cells from here on that are erased rather than written."""
+        """Return the number of cells from `place` on that are erased rather than written."""
         cell = cells[place]
         if not self._erases or cell is None or cell[0] != " " or not erasable(cell[1]):
             return 0
@@ -300,7 +301,7 @@ class Pen:
         self.size += len(text)
 
     def text(self) -> str:
-        """All that was written, with colors as they were before."""
+        """All output, ending with the colors reset."""
         if self._ansi:
             self._put("\x1b[0m")
             self._ansi = ""

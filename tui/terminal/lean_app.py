@@ -1,7 +1,7 @@
-"""An app whose pictures go to the terminal as fast as it takes them, in as few bytes as can be.
+"""An app that sends pictures as fast as the terminal accepts them, in as few bytes as possible.
 
-Nothing is drawn that the terminal cannot take yet: what is late is left out, never queued. So a
-key that comes back from a slow link finds no second-long row of pictures before its own.
+Nothing is drawn before the terminal can accept it: late pictures are skipped, never queued. So the
+effect of a key on a slow link does not wait behind seconds of older pictures.
 """
 
 from __future__ import annotations
@@ -25,19 +25,19 @@ from .pacing import ASK, WHOLE, Pacing
 SIXTEEN = frozenset({ColorSystem.STANDARD, ColorSystem.WINDOWS})
 
 FIRST_PIECE = 60
-"""Bytes of the first piece of what hurries on a slow link: about a row."""
+"""Bytes of the first piece of urgent output on a slow link: about one row."""
 
 PACKETS_APART = 0.02
 """Seconds between that piece and the next."""
 
 HURRY_FOR = 0.5
-"""Seconds for which the output of a key precedes automatic changes."""
+"""Seconds after a key in which changes are sent as urgent."""
 
 
 class LeanApp(App[None]):
-    """Sends the difference between what is to be shown and what is, when the terminal can take it.
+    """Sends differences between intended and present contents when the terminal can accept them.
 
-    `fit_terminal` learns before it runs what the terminal and the way to it are like.
+    Call `fit_terminal` with the terminal's abilities before the app runs.
     """
 
     def __init__(self) -> None:
@@ -50,13 +50,13 @@ class LeanApp(App[None]):
         """True if a frame was sent in part."""
 
     def fit_terminal(self, abilities: Abilities, *, slow: bool = False) -> None:
-        """Use signs and colors that the terminal has.
+        """Use only signs and colors that the terminal has.
 
-        With `slow` the link is taken for slow until it has shown its rate.
+        With `slow` the link counts as slow until its rate has been measured.
         """
         self._colors = abilities.colors or ColorSystem.STANDARD
         self.plain_signs = abilities.encoding != UTF_8
-        """True if the terminal has signs of ASCII only, or few more."""
+        """True if the terminal has ASCII characters only, or few more."""
         self.has_braille = abilities.braille
         """True if its font has the dots of braille."""
         self._instead = filters_for(abilities)
@@ -64,17 +64,16 @@ class LeanApp(App[None]):
         self._pacing = Pacing(slow=slow)
 
     def get_line_filters(self) -> Sequence[LineFilter]:
-        """Textual's own, but for its way to leave colors out, and those of this terminal."""
+        """Textual's filters except its monochrome one, and those for this terminal."""
         own = [
             filter_ for filter_ in super().get_line_filters() if not isinstance(filter_, Monochrome)
         ]
         return [*own, *self._instead]
 
     def take_styles(self, screen: object) -> None:
-        """Know the styles of a screen before it is shown; they concern nothing that is already
-        shown.
+        """Load the styles of a screen before it is shown; they affect nothing already shown.
 
-        Textual would read all styles of the app again, and style everything that is shown.
+        Textual would reload all styles of the app, and restyle everything shown.
         """
         for path in screen.css_path if isinstance(screen, Screen) else ():
             if not self.stylesheet.has_source(str(path), ""):
@@ -86,16 +85,16 @@ class LeanApp(App[None]):
         return super().push_screen(screen, *args, **settings)
 
     def switch_screen(self, screen: Any) -> Any:
-        """Show a screen in place of the one on top."""
+        """Show a screen instead of the one on top."""
         self.take_styles(screen)
         return super().switch_screen(screen)
 
     def hurry(self) -> None:
-        """Draw the next change at once: a person waits for it, or must see it."""
+        """Send the next changes as urgent: a person waits for them, or must see them."""
         self._hurries_until = time.monotonic() + HURRY_FOR
 
     def picture_taken(self, at: float) -> None:
-        """The terminal has drawn the oldest frame on its way, and said so at this time."""
+        """Note that the terminal reported at this time that it drew the oldest pending frame."""
         self._pacing.answered(at)
         self._send()
 
@@ -110,17 +109,17 @@ class LeanApp(App[None]):
 
     @property
     def _draws(self) -> bool:
-        """True if there is a terminal, and a picture of it that is complete."""
+        """True if there is a terminal and no update is being collected."""
         there = self._running and not self._closed and not self.is_headless
         return there and self._driver is not None and not self._batch_count
 
     def _send(self) -> None:
-        """Draw what the terminal can take now; the rest when it has drawn that."""
+        """Send what the terminal can accept now; send the rest after it has drawn that."""
         if self._picture.is_shown or not self._draws:
             return
         now = time.monotonic()
         if not self._first_request:
-            # its answer tells how long the way is, before there is anything on it
+            # the answer shows the round trip of the empty link
             self._write("", now)
             self._first_request = self._begun = True
         hurry = now < self._hurries_until
@@ -131,7 +130,7 @@ class LeanApp(App[None]):
             self._begun = not self._picture.is_shown
             if not self._begun:
                 break
-            if first:  # in a packet of its own, which is shown before the rest has come
+            if first:  # in a packet of its own, which is shown before the rest arrives
                 self._later_by(PACKETS_APART)
                 return
         self._look_later(now)
@@ -149,7 +148,7 @@ class LeanApp(App[None]):
         self._pacing.sent(len(frame), now)
 
     def _look_later(self, now: float) -> None:
-        """Check later: without an answer nothing else would send the rest."""
+        """Try again later: if the terminal does not answer, nothing else sends the rest."""
         wait = self._pacing.wait(now)
         if wait is not None and not self._picture.is_shown:
             self._later_by(wait)
@@ -160,7 +159,7 @@ class LeanApp(App[None]):
         self._later = asyncio.get_running_loop().call_later(seconds, self._send)
 
     def on_mount(self) -> None:
-        """A terminal that was left for a while may show something else."""
+        """Redraw after the app was suspended: the terminal may show something else."""
         self.app_resume_signal.subscribe(self, lambda _: self._anew())
 
     def on_resize(self) -> None:

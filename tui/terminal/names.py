@@ -1,7 +1,7 @@
-"""Names of Textual 8.2 for keys, from the characters that a terminal sends.
+"""Textual 8.2's names of keys, from the characters that a terminal sends.
 
-Textual's own tables are used for all that is not ambiguous between terminals, so that a key has the
-name here that it has everywhere in Textual.
+Textual's own tables are used unless terminals contradict each other, so that names agree with
+Textual.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Named = tuple[str, str | None]
 
 SPACE: Final = ("space", " ")
 SPACE_ALONE: Final = ("space", None)
-"""Space behind an ESC that may have been Escape: a stop, and no text."""
+"""Space after an ESC that may have been the key Escape: a stop, never text."""
 
 VT100_PLUS: Final = {f"\x1bO{final}": f"f{n}" for n, final in enumerate("TUVWXYZ[", 5)}
 """PuTTY's VT100+ mode from F5 on; F1 to F4 are those of an xterm."""
@@ -38,16 +38,16 @@ SCO: Final = {
     "\x1b[N": "f2",
     **{f"\x1b[{final}": f"f{n}" for n, final in enumerate("TUVWX", 8)},
 }
-"""PuTTY's SCO mode and the old BSD and SCO consoles, but for what is ambiguous.
+"""PuTTY's SCO mode and the old BSD and SCO consoles, except ambiguous sequences.
 
-ESC [ U was the end of the page on a Mach console; a stop there is the lesser evil.
+ESC [ U was Page Down on a Mach console; a stop there is the lesser evil.
 """
 
 FOCUS_REPORTS: Final = ("\x1b[I", "\x1b[O")
-"""Reports that the terminal's window got or lost the focus; PgUp and F3 of SCO."""
+"""Reports that the terminal's window got or lost the focus; in SCO mode, PgUp and F3."""
 
 AMBIGUOUS: Final = frozenset({*FOCUS_REPORTS, "\x1b[P", "\x1b[Q", "\x1b[R", "\x1b[S"})
-"""F4 to F7 of SCO are F1 to F4 of the kitty protocol, and one is a Linux console's Pause."""
+"""SCO's F4 to F7 are F1 to F4 in the kitty protocol, and one is Pause on a Linux console."""
 
 _MODIFIED = re.compile(
     r"\x1b\[(\d{0,7})((?::\d{0,7}){0,2})"  # the key, and what it is with Shift
@@ -69,7 +69,7 @@ def unshifted_digit(character: str) -> str:
 
 
 def character_name(character: str) -> Named | None:
-    """The key that sends this one character; None for what no key sends."""
+    """The key that sends this character; None if no key sends it."""
     value = ANSI_SEQUENCES_KEYS.get(character)
     if isinstance(value, tuple) and character < "\x80":
         return value[0].value, character
@@ -79,7 +79,7 @@ def character_name(character: str) -> Named | None:
 
 
 def with_alt(character: str) -> Named:
-    """ESC and a character in one go: a key of its own, never the character alone."""
+    """The key of ESC and a character read together; never the character alone."""
     value = ANSI_SEQUENCES_KEYS.get(f"\x1b{character}")
     if isinstance(value, tuple):
         return value[0].value, None
@@ -92,9 +92,9 @@ def with_alt(character: str) -> Named:
 
 @lru_cache(maxsize=512)
 def sequence_name(sequence: str, *, kitty: bool = False) -> Named | None:
-    """The key that sends this complete sequence; None if it is not a key or not known.
+    """The key of a complete sequence; None if it is not a key or not known.
 
-    Only where the `kitty` protocol was asked for, ESC [ P to ESC [ S are its F1 to F4.
+    With the `kitty` protocol, ESC [ P to ESC [ S are F1 to F4.
     """
     if sequence in AMBIGUOUS and not (kitty and sequence not in FOCUS_REPORTS):
         return None
@@ -131,13 +131,13 @@ def _modified(sequence: str) -> Named | None:
 
 
 def _only_listed(sequence: str) -> Named | None:
-    """A sequence with modifiers that is in Textual's table alone."""
+    """A sequence with modifiers that only Textual's table has."""
     value = ANSI_SEQUENCES_KEYS.get(sequence)
     return (value[-1].value, None) if isinstance(value, tuple) and len(value) == 1 else None
 
 
 def _typed(code: int, bits: int, text: str) -> Named | None:
-    """A character that came as its number, with modifiers."""
+    """A character that was sent as a number, with modifiers."""
     if name := FUNCTIONAL_KEYS.get(f"{code}u"):
         return (_chord(bits, name), None) if bits else character_name(chr(code))
     try:

@@ -1,4 +1,4 @@
-"""Writing to a terminal that may go away."""
+"""Writing to a terminal that may disappear."""
 
 from __future__ import annotations
 
@@ -11,27 +11,27 @@ log = logging.getLogger(__name__)
 
 
 class Outlet:
-    """The file of a terminal, which takes everything once the terminal is gone.
+    """The file of a terminal that discards all output after the terminal has disappeared.
 
-    Textual writes to it in a thread. An error there would end the thread, and the panel would
-    then wait for it without end: no motor would be stopped.
+    Textual writes to it in a thread. An error there would end the thread, and the panel would then
+    wait for it forever: no motor would be stopped.
     """
 
     def __init__(self, file: IO[str]) -> None:
         self._file = file
-        self._gone = False
+        self._lost = False
 
     def write(self, text: str) -> None:
-        """Write text; give the panel SIGHUP if the terminal is gone."""
-        if not self._gone:
+        """Write text; send the panel SIGHUP if the terminal has disappeared."""
+        if not self._lost:
             try:
                 self._file.write(text)
             except OSError as error:
                 self._lose(error)
 
     def flush(self) -> None:
-        """Hand over what was written."""
-        if not self._gone:
+        """Flush what was written."""
+        if not self._lost:
             try:
                 self._file.flush()
             except OSError as error:
@@ -46,6 +46,6 @@ class Outlet:
         return self._file.isatty()
 
     def _lose(self, error: OSError) -> None:
-        log.error("the terminal takes nothing any more: %s", error)
-        self._gone = True
+        log.error("the terminal no longer accepts output: %s", error)
+        self._lost = True
         os.kill(os.getpid(), signal.SIGHUP)

@@ -1,9 +1,8 @@
-"""When the next frame may go to the terminal, and how much of it: what is on its way is counted.
+"""Flow control: when the next frame may be sent to the terminal, and how much of it.
 
-The queue of a pseudo-terminal does not show what sshd and the network hold. So the terminal is
-asked for its cursor behind each frame (`ASK`); it answers once it has drawn what came before, and
-the next frame waits for that. Times are seconds of one clock, given with each call; nothing here
-looks at a clock.
+The queue of a pseudo-terminal does not show what sshd and the network hold. So each frame is
+followed by a cursor request (`ASK`). The terminal answers after it has drawn the frame, and the
+next frame waits for that. The caller passes all times, in seconds of one clock.
 """
 
 from __future__ import annotations
@@ -12,40 +11,40 @@ from collections import deque
 from typing import Final
 
 ASK: Final = "\x1b[6n"
-"""Requests the place of the cursor; every terminal since the VT100 answers."""
+"""Requests the cursor position; every terminal since the VT100 answers."""
 
 MUTE_AFTER: Final = 2.0
 """Seconds that a frame waits for the answer of a terminal that has never answered."""
 
 LOST_AFTER: Final = 10.0
-"""Seconds after which an answer is taken for lost where others came."""
+"""Seconds after which an answer counts as lost, if earlier ones came."""
 
 PIECE_LEAST: Final = 300
-"""Bytes that a piece of a frame may always have. SSH shows a piece once all of it has come."""
+"""Bytes that a piece of a frame may always have. SSH delivers a piece once it is complete."""
 
 AHEAD: Final = 450
-"""Bytes that may be on their way when something that hurries follows them."""
+"""Bytes that may be on the way when urgent output follows."""
 
 AHEAD_OF_REST: Final = 900
-"""The same for the rest of a frame that has begun: the link stays full on a long way, too."""
+"""The same for the rest of a frame: so a link with a long delay stays busy."""
 
 WHOLE: Final = 1 << 20
-"""Bytes that no frame has."""
+"""More bytes than any frame has."""
 
 PIECE_TIME: Final = 0.3
 """Seconds that the link may take for one piece of a frame, above its shortest round trip."""
 
 GROWTH: Final = 4
-"""Growth of a piece after one that was sent fast."""
+"""Factor by which the piece grows after a fast one."""
 
 OWED_MOST: Final = 32
-"""Questions that a terminal without answers is kept account of."""
+"""Unanswered requests that are remembered at most."""
 
 
 class Pacing:
-    """Counts the frames that a terminal has not answered yet; their answers measure the link.
+    """Counts the frames that a terminal has not answered yet; the answers measure the link.
 
-    With `slow` the link is taken for slow until it has shown that it is not.
+    With `slow` the link counts as slow until its rate has been measured.
     """
 
     def __init__(self, *, slow: bool = False) -> None:
@@ -55,30 +54,30 @@ class Pacing:
         self._piece = PIECE_LEAST if slow else WHOLE
 
     def sent(self, size: int, now: float) -> None:
-        """So many bytes went out, and the question behind them."""
+        """Note that `size` bytes were sent, followed by a cursor request."""
         self._requested.append((now, size))
 
     def answered(self, now: float) -> None:
-        """An answer came: the oldest frame on its way is drawn."""
+        """Note an answer: the oldest frame on the way has been drawn."""
         self._answers = True
         if not self._requested:
-            return  # it was taken for lost
+            return  # it had counted as lost
         since, size = self._requested.popleft()
         self._quickest = min(self._quickest, now - since)
         self._learn(size, now - since - self._quickest)
 
     def _learn(self, size: int, took: float) -> None:
-        """Fit the size of a piece to the time that one took."""
+        """Adapt the size of a piece to the time that the last one took."""
         if took > 2 * PIECE_TIME:
             self._piece = max(PIECE_LEAST, int(size * PIECE_TIME / took))
         elif took < PIECE_TIME / 4 and size > self._piece / 2:
             self._piece = min(WHOLE, GROWTH * self._piece)
 
     def room(self, now: float, *, hurry: bool = False, rest: bool = False) -> int:
-        """Bytes that may go out now; 0 while what went before is on its way.
+        """Bytes that may be sent now; 0 while the last frame is on the way.
 
-        What hurries (what a key brings, a stop, a fault) and the `rest` of a frame that has begun
-        follow a small piece at once.
+        Urgent output (after a key, a stop, a fault) and the `rest` of a frame may be sent sooner,
+        while only a small piece is on the way.
         """
         on_its_way, mute = self._on_its_way(now), self._is_mute(now)
         ahead = AHEAD_OF_REST if rest else AHEAD if hurry else 0
@@ -87,13 +86,13 @@ class Pacing:
         return WHOLE if mute else self._piece
 
     def wait(self, now: float) -> float | None:
-        """Seconds until an answer that is waited for counts as lost; None where none is."""
+        """Seconds until the awaited answer counts as lost; None if none is awaited."""
         if not self._on_its_way(now):
             return None
         return max(0.0, self._requested[-1][0] + self._patience - now)
 
     def forget(self) -> None:
-        """The terminal was left for a while: what it still owes does not come."""
+        """Expect no more answers, because the app was suspended."""
         self._requested.clear()
 
     @property
@@ -101,7 +100,7 @@ class Pacing:
         return LOST_AFTER if self._answers else MUTE_AFTER
 
     def _is_mute(self, now: float) -> bool:
-        """Return True if the terminal has had the time to answer, and never did."""
+        """Return True if the terminal never answered, although it had the time."""
         return (
             not self._answers
             and bool(self._requested)
@@ -109,7 +108,7 @@ class Pacing:
         )
 
     def _on_its_way(self, now: float) -> list[int]:
-        """The sizes of the frames that are still waited for; an empty one counts as a byte."""
+        """The sizes of the frames whose answers are awaited; an empty one counts as a byte."""
         if self._answers:
             while self._requested and now >= self._requested[0][0] + self._patience:
                 self._requested.popleft()

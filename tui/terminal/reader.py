@@ -1,11 +1,11 @@
-"""From the bytes of a terminal to keys with their strokes: alone, together, or held down.
+"""From a terminal's bytes to keys with their strokes: alone, together, or held down.
 
-Stop keys are taken on the way. Runs in the thread that reads the keys, so that a stop waits neither
-for the screen nor for what the terminal takes.
+Stop keys are handled on the way. Runs in the thread that reads the keys, so that a stop waits
+neither for the screen nor for the terminal's output.
 
-A person types one key after another; a paste without brackets, or a link that hung, brings many at
-once. A key that can do no harm in a burst does not wait, but counts as one of its keys. Times are
-seconds of one clock, given with each key; `Bursts` looks at no clock.
+A person types one key after another. A paste without brackets, or a link that hung, delivers many
+at once. A key that can do no harm in a burst does not wait, but counts as one of its keys. The
+caller of `Bursts` passes all times, in seconds of one clock.
 """
 
 from __future__ import annotations
@@ -27,20 +27,20 @@ SHORTEST_REPEAT: Final = 0.005
 """Seconds between two keys below which no keyboard repeats."""
 
 UNEVEN: Final = 0.02
-"""Seconds by which the times between repeats of a held key differ at most."""
+"""Seconds by which the intervals between repeats of a held key may differ."""
 
 REPEATS: Final = 3
-"""Keys at an even pace that make a held key."""
+"""Keys at an even pace that count as a held key."""
 
 HELD_LONGEST: Final = 0.15
-"""Seconds after which keys that are known not to be alone are held back no longer."""
+"""Seconds after which keys that did not arrive alone are held back no longer."""
 
 STEPPING: Final = frozenset({"up", "down", "left", "right", "pageup", "pagedown"})
-"""Keys that a person holds down to go on."""
+"""Keys that a person holds down to step repeatedly."""
 
 
 class Bursts:
-    """Holds keys back until it is known whether they came alone."""
+    """Holds keys back until it is known if they arrived alone."""
 
     def __init__(self) -> None:
         self._waiting: list[KeyToken] = []
@@ -62,7 +62,7 @@ class Bursts:
         return bool(self._waiting)
 
     def key(self, key: KeyToken, *, at_once: bool = False) -> None:
-        """Add a key: `given` decides about it, or returns it in any case if it acts `at_once`."""
+        """Add a key; `given` returns it once it is classified, or next if it acts `at_once`."""
         self._join(key.began, key.at)
         if not self._reads or self._reads[-1][-1].at != key.at:
             self._reads = [*self._reads[1 - REPEATS :], []]
@@ -75,20 +75,23 @@ class Bursts:
             self._waiting.append(key)
 
     def stop(self, key: KeyToken) -> None:
-        """A stop key was taken: whatever was typed before it and still waits is void."""
+        """Discard all waiting keys, because a stop key was handled."""
         self._waiting.clear()
         self._given = [given for given in self._given if isinstance(given, Paste)]
         self._join(key.began, key.at)
         self._repeating, self._stepped, self._reads = None, True, []
 
     def paste(self, paste: Paste) -> None:
-        """A paste keeps its place among the keys; those beside it are not alone."""
+        """Add a paste in its place among the keys; keys close to it do not count as alone."""
         self._join(paste.at, paste.at)
         self._give_parts()
         self._given.append(paste)
 
     def given(self, now: float, pending: float | None = None) -> list[Pressed | Paste]:
-        """Return the known keys; `pending` is when a sequence began that may become a key."""
+        """Return the classified keys.
+
+        `pending` is when an unfinished sequence that may become a key began.
+        """
         self._give_repeats()
         if not self._hangs_on(pending):
             if now - self._last > BURST_GAP:
@@ -99,21 +102,21 @@ class Bursts:
         return found
 
     def deadline(self, pending: float | None = None) -> float | None:
-        """When it will be known whether what waits is alone; None if time shows nothing."""
+        """When the waiting keys will be classified; None if that does not depend on time."""
         return self._last + BURST_GAP if self._waiting and not self._hangs_on(pending) else None
 
     def _hangs_on(self, pending: float | None) -> bool:
         return pending is not None and pending - self._last <= BURST_GAP
 
     def _join(self, began: float, at: float) -> None:
-        """One more member of the piece; a new piece where the last is over."""
+        """Count a member of the burst; begin a new burst if the last one is over."""
         if began - self._last > BURST_GAP:
             self._close()
         self._members += 1
         self._last = at
 
     def _close(self) -> None:
-        """The piece is over."""
+        """End the burst."""
         if self._members == 1 and self._waiting:
             self._give(self._waiting.pop(), alone=True, steps=True)
         self._give_parts()
@@ -127,7 +130,7 @@ class Bursts:
         self._given.append(Pressed(key.name, key.character, stroke))
 
     def _give_parts(self) -> None:
-        """Give out what waits as parts of a piece; of arrows, the first steps once."""
+        """Emit the waiting keys as parts of a burst; if all are one arrow, the first may step."""
         steps = not self._stepped and len(self._names) == 1 and self._names <= STEPPING
         for key in self._waiting:
             self._give(key, steps=steps, piece=self._members)
@@ -135,7 +138,7 @@ class Bursts:
         self._waiting.clear()
 
     def _give_repeats(self) -> None:
-        """Give out what a held key repeats, one a read."""
+        """Emit the repeats of a held key, one per read."""
         if not self._waiting or not self._reads:
             return
         last = self._reads[-1]
@@ -148,7 +151,7 @@ class Bursts:
             self._repeating = None
 
     def _give_held(self, count: int, run: int) -> None:
-        """Of the last keys that wait, give so many as held; the others as parts."""
+        """Emit `count` of the last `run` waiting keys as held, and the others as parts."""
         first = max(0, len(self._waiting) - run)
         ahead, held = self._waiting[:first], self._waiting[first : first + count]
         behind = self._waiting[first + count :]
@@ -175,18 +178,19 @@ def _even(reads: Sequence[Sequence[KeyToken]]) -> bool:
 log = logging.getLogger(__name__)
 
 MAY_STOP = (b" ", b"\x1b")
-"""One of these is in the bytes of every stop key, whatever terminal sends it."""
+"""The bytes of every stop key contain one of these, on any terminal."""
 EDITING = frozenset({"backspace", "delete", "left", "right", "home", "end"})
-"""Keys that edit a text, besides those that write it; any other one may leave it."""
+"""Keys that edit a text, besides typed characters; any other key may leave the field."""
 
 
 class Stops(Protocol):
     """Calls to the app in the thread that reads the keys."""
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
-        """Stop, if the key means that now; True if it was taken.
+        """Stop if the key is a stop key now; True if it was handled.
 
-        `left_at` is when a key was read that may leave the text which a Space would belong to.
+        `left_at` is when a key was read that may have left the text field, in which a Space would
+        be text.
         """
 
     def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
@@ -197,20 +201,20 @@ class Stops(Protocol):
         """
 
     def stop_stamp(self) -> object:
-        """Another object after every stop."""
+        """Return a value that changes with every stop."""
 
     def last_stop(self, error: Exception) -> None:
-        """Stop every drive: keys, or what they do, failed by an internal error."""
+        """Stop every drive, after an internal error in the handling of keys."""
 
     def sequence_swallowed(self, data: bytes) -> None:
-        """A sequence came that no known terminal sends; it did nothing."""
+        """Note a sequence that no known terminal sends; it had no effect."""
 
 
 TerminalInput = Pressed | Paste | Report
 
 
 class KeyReader:
-    """Takes bytes and times, returns the messages for the app."""
+    """Turns bytes and their times into messages for the app."""
 
     def __init__(
         self, stops: Stops, *, mouse: bool = False, escape_delay: float = ESCAPE_DELAY
@@ -220,8 +224,8 @@ class KeyReader:
         self._begin()
 
     def _begin(self) -> None:
-        """Nothing is known of the bytes before."""
-        # a byte that is no text stays what it is: it may begin a sequence
+        """Start without any earlier bytes."""
+        # a byte that is not valid UTF-8 is kept: it may begin a sequence
         self._decode = codecs.getincrementaldecoder("utf-8")("surrogateescape").decode
         self._tokens = Tokenizer(mouse=self._mouse, escape_delay=self._escape_delay)
         self._bursts = Bursts()
@@ -230,7 +234,7 @@ class KeyReader:
         """When the last key was read that was no stop."""
 
     def read(self, data: bytes, now: float, stamp: object = None) -> list[TerminalInput]:
-        """Bytes that were read at this time, when the app's stamp of stops was this."""
+        """Handle bytes read at this time, when the app's stop stamp had this value."""
         try:
             return self._read(data, now, stamp)
         except Exception as error:
@@ -247,11 +251,11 @@ class KeyReader:
         try:
             return self._sorted(self._tokens.tick(now), now)
         except Exception as error:
-            # what a sequence was that had begun is not known
+            # an unfinished sequence may have been a stop key
             return self._failed(error, MAY_STOP[1])
 
     def _failed(self, error: Exception, data: bytes) -> list[TerminalInput]:
-        """Stop every drive if the lost bytes may have been a stop key; then begin again."""
+        """Stop every drive if the lost bytes may have been a stop key; then start again."""
         log.error("keys could not be read", exc_info=error)
         try:
             if any(item in data for item in MAY_STOP):
@@ -263,7 +267,7 @@ class KeyReader:
 
     @property
     def deadline(self) -> float | None:
-        """When `tick` has something to do, or None."""
+        """The time at which `tick` must be called, or None."""
         found = [self._tokens.deadline, self._bursts.deadline(self._tokens.pending)]
         return min((time for time in found if time is not None), default=None)
 
@@ -297,6 +301,6 @@ class KeyReader:
         return key.name in STOP_KEYS and self._stops.take_stop_key(key.name, self._left(key))
 
     def _left(self, key: KeyToken) -> float | None:
-        """When a key was read last, up to this one, that may leave a text."""
+        """When the last key that may leave a text field was read, up to this one."""
         writes = key.character is not None and key.character.isprintable()
         return self._left_at if writes or key.name in EDITING else key.began

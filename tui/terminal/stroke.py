@@ -21,13 +21,13 @@ class Stroke(NamedTuple):
     steps: bool = True
     """True if it may step a value: alone, held, or the first of a piece of one arrow only."""
     piece: int = 1
-    """Number of keys that came together, as far as known."""
+    """Number of keys that arrived together, as far as known."""
     at_once: bool = False
-    """True if it did not wait to be known as alone: it may only move, write text or show."""
+    """True if it did not wait to be classified: it may only move, type text or show."""
 
     @property
     def acts(self) -> bool:
-        """True if it may do more than write text and move a cursor."""
+        """True if it may do more than type text and move a cursor."""
         return self.alone or self.held
 
 
@@ -40,11 +40,11 @@ class Pressed(NamedTuple):
 
 
 def attach(event: Event, stroke: Stroke) -> None:
-    """Let an event of Textual carry what is known of the key."""
+    """Attach a stroke to a Textual event."""
     vars(event)["stroke"] = stroke
 
 
 def stroke_of(event: Event) -> Stroke | None:
-    """Return the facts about the key of an event; None for one that no terminal has sent."""
+    """Return the stroke of an event; None if no terminal sent the key."""
     known: Any = vars(event).get("stroke")
     return known if isinstance(known, Stroke) else None

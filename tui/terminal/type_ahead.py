@@ -1,9 +1,8 @@
-"""Keys one after another: what is typed ahead reaches the dialog that an earlier key opens.
+"""Type-ahead: keys take effect one after another, so that they reach a dialog that a key opens.
 
-Textual hands each key to the screen of that moment; a key that the screen does not take itself
-comes back to the app's queue, behind those that were typed since. Without this the 30 of a
-quickly typed `f30` would be keys of the screen below. Whether a key may do anything is asked when
-its turn comes: a stop voids those that still wait.
+Textual sends each key to the present screen. A key that the screen does not handle returns to the
+app's queue, after keys typed since. Without this module, the 30 of a quickly typed `f30` would go
+to the screen below. Each key is checked when its turn comes: a stop discards keys that still wait.
 """
 
 from __future__ import annotations
@@ -26,19 +25,19 @@ from .fields import takes_text
 from .stroke import Stroke, attach, stroke_of
 
 WAIT_LONGEST = 3.0
-"""Seconds that a key waits at most for the one before: a slow computer builds a screen in less."""
-LOOK = 0.05
-"""Seconds between two looks whether a queue that is waited for is still that of the key."""
+"""Seconds that a key waits at most for the one before; a slow computer builds a screen in less."""
+QUEUE_CHECK_INTERVAL = 0.05
+"""Seconds between two checks if the awaited queue still belongs to the present screen."""
 
 CURSOR_KEYS = frozenset(
     {"up", "down", "left", "right", "pageup", "pagedown", "home", "end", "tab", "shift+tab"}
 )
-"""Keys that move a cursor, and that a piece may move it with."""
+"""Keys that move a cursor, even in a burst."""
 
 EDITS = frozenset({"backspace", "delete"})
 
 KEYS_REPORTED_AFTER = 0.1
-"""Seconds after which the keys of a piece are reported without waiting for more."""
+"""Seconds without another ignored key, after which ignored keys are reported."""
 
 
 PASTE_IGNORED = "Pasted text ignored: it goes into a text field only."
@@ -47,42 +46,41 @@ Typed = Key | Paste
 
 
 class Stamps(Protocol):
-    """Needs of admission that not every app meets."""
+    """Methods that the app provides for type-ahead."""
 
     def stop_stamp(self) -> object:
-        """Another object after every stop."""
+        """Return a value that changes with every stop."""
 
     def only_shows(self, key: str, character: str | None) -> bool:
-        """Return True if a key can only move a cursor, write text or show something now."""
+        """Return True if a key can only move a cursor, type text or show something now."""
 
-    def ignored_keys_text(self, count: int, *, late: bool = False) -> None:
-        """Report that keys came at once, or too late, and did nothing."""
+    def report_ignored_keys(self, count: int, *, late: bool = False) -> None:
+        """Report keys that were ignored because they arrived together, or too `late`."""
 
 
 class TypeAhead:
-    """Lets the app take a key only when the one before has had its whole effect."""
+    """Gives the app a key only after the one before has taken full effect."""
 
     def __init__(self, app: App[None], stamps: Stamps) -> None:
         self._app = app
         self._stamps = stamps
         self._refused = 0
-        """Keys that were refused and not reported yet."""
+        """Number of ignored keys that are not reported yet."""
         self._late = False
         self._looking = False
         self._waiting: deque[Typed] = deque()
         self._taken: Typed | None = None
         self._task: asyncio.Task[None] | None = None
         self.done_to = float("-inf")
-        """When the last key was read that had its whole effect, or was not taken."""
+        """When the last key that took full effect, or was ignored, was read."""
 
     @property
     def stroke(self) -> Stroke | None:
-        """The stroke of the key that has its effect now; None while there is none."""
+        """The stroke of the key that is taking effect now, or None."""
         return stroke_of(self._taken) if self._taken is not None else None
 
     def admit(self, typed: Typed) -> bool:
-        """Return True if the app may take this key now; one that must wait comes again in its
-        turn."""
+        """Return True if the app may handle this key now; if not yet, it is posted again."""
         if self._taken is not None and typed is not self._taken:
             if not self._repeats_the_last(typed):
                 self._waiting.append(typed)
@@ -95,7 +93,7 @@ class TypeAhead:
         return True
 
     def _repeats_the_last(self, typed: Typed) -> bool:
-        """Return True if it is a held key that waits already: it is to end with the key."""
+        """Return True for a repeat of a held key that waits already: it must end on release."""
         last = self._waiting[-1] if self._waiting else None
         if not isinstance(typed, Key) or not isinstance(last, Key) or typed.key != last.key:
             return False
@@ -116,7 +114,7 @@ class TypeAhead:
             self._app.post_message(self._taken)
 
     async def _worked_off(self) -> None:
-        """Wait for every queue on the key's way, and for a screen that it opened."""
+        """Wait for every message queue on the key's way, and for a screen that it opened."""
         while self._app.is_running:
             screen = self._app.screen
             at: DOMNode | None = self._app.focused or screen
@@ -130,17 +128,17 @@ class TypeAhead:
         return self._app.screen if self._app.is_running else None
 
     async def _emptied(self, pump: MessagePump, screen: Screen[Any]) -> None:
-        """Wait until a queue has handled its present contents, or belongs to another screen."""
+        """Wait until a queue has handled its present messages, or another screen is on top."""
         done = asyncio.Event()
         if not pump.call_later(done.set):
             return
         while not done.is_set() and pump.is_running and self._top() is screen:
             with suppress(TimeoutError):
-                async with asyncio.timeout(LOOK):
+                async with asyncio.timeout(QUEUE_CHECK_INTERVAL):
                     await done.wait()
 
     def _admits(self, event: Key | Paste) -> bool:
-        """Return True if the app may take a key or a paste now, when its turn has come."""
+        """Return True if a key or a paste may take effect, now that its turn has come."""
         if isinstance(event, Paste):
             is_text = takes_text(self._app.focused)
             if event.text and not is_text:
@@ -151,7 +149,7 @@ class TypeAhead:
             attach(event, Stroke(time.monotonic(), self._stamps.stop_stamp()))
             return True
         if stroke.stamp != self._stamps.stop_stamp():
-            return False  # a stop was the last word
+            return False  # a stop discards keys typed before it
         late = time.monotonic() - stroke.read_at > KEY_TOO_LATE
         if late:
             attach(event, stroke._replace(alone=False, held=False, steps=False))
@@ -161,7 +159,7 @@ class TypeAhead:
         return False
 
     def _harmless(self, event: Key) -> bool:
-        """Return True if a key of a piece can only write text or move a cursor."""
+        """Return True if a key of a burst can only type text or move a cursor."""
         if event.key in CURSOR_KEYS:
             return True
         stroke = stroke_of(event)
@@ -178,11 +176,11 @@ class TypeAhead:
             self._look(0)
 
     def _look(self, before: int) -> None:
-        """Report once no more keys of the piece arrive."""
+        """Report the ignored keys once no more arrive."""
         if self._refused > before:
             now = self._refused
             self._app.set_timer(KEYS_REPORTED_AFTER, lambda: self._look(now))
             return
         count, late = self._refused, self._late
         self._refused, self._late, self._looking = 0, False, False
-        self._stamps.ignored_keys_text(count, late=late)
+        self._stamps.report_ignored_keys(count, late=late)

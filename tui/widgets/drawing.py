@@ -1,4 +1,4 @@
-"""Drawing with characters: rules, cut and wrapped text, lines of keys; pure functions."""
+"""Drawing with characters: rules, cut and wrapped text, key bars; pure functions."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from .palette import (
 
 
 def rule(title: str, width: int, right: str = "") -> Text:
-    """The heading of a part: its title on a thin line."""
+    """The heading of a section: its title on a thin line, `right` at the right if there is room."""
     tail = f" {right} " if right and len(title) + len(right) + 5 <= width else ""
     text = Text(no_wrap=True)
     text.append(f"{title} ", TITLE)
@@ -38,18 +38,18 @@ def rule(title: str, width: int, right: str = "") -> Text:
 
 
 def short(text: str, width: int) -> str:
-    """The text in at most so many cells, with an ellipsis where it is too long."""
+    """The text in at most `width` cells, with an ellipsis if it is too long."""
     text = plain(text)
     return f"{text[: width - 1]}…" if len(text) > width else text
 
 
 def cut(text: str, width: int) -> str:
-    """The text in exactly so many cells, with an ellipsis where it is too long."""
+    """The text in exactly `width` cells, with an ellipsis if it is too long."""
     return f"{short(text, width):<{width}}"
 
 
 def cut_at_word(text: str, width: int) -> str:
-    """The text in at most so many cells, ended at a word with an ellipsis where it is longer."""
+    """The text in at most `width` cells, cut after a whole word with an ellipsis if too long."""
     text = plain(text)
     if len(text) <= width:
         return text
@@ -109,8 +109,16 @@ def _without_middle(text: str, width: int) -> list[str]:
     return [f"{text[:head]}…{text[-tail:]}" for _, head, tail in sorted(found)] or [text[:width]]
 
 
+def whole_sentences(text: str, width: int) -> str:
+    """As many whole sentences as fit the width; the whole text if not even the first one does."""
+    if len(text) <= width:
+        return text
+    end = text.rfind(". ", 0, width + 1)
+    return text if end < 0 else text[:end]
+
+
 def wrapped(text: str, width: int, most: int) -> list[str]:
-    """The text in lines of that width, at most so many."""
+    """The text in lines of at most `width` cells, `most` lines at most."""
     if not text or most < 1:
         return []
     text = plain(text, lines=True)
@@ -118,11 +126,11 @@ def wrapped(text: str, width: int, most: int) -> list[str]:
 
 
 KeyLabel = tuple[str, str, str]
-"""An action, its key and its label in the line of keys."""
+"""An action, its key and its label in the key bar."""
 
 
 def fitting(keys: Sequence[KeyLabel], width: int, kept: Collection[str]) -> list[KeyLabel]:
-    """The keys for which there is room; the last go first, those of the actions kept never."""
+    """The keys that fit the width; the last are dropped first, those in `kept` never."""
     left = list(keys)
     for key in reversed(keys):
         if key_line(left).cell_len <= width:
@@ -133,14 +141,14 @@ def fitting(keys: Sequence[KeyLabel], width: int, kept: Collection[str]) -> list
 
 
 def key_styles(action: str) -> tuple[Style, Style]:
-    """Return the styles of a key and its words; a key that stops a motor is red."""
+    """Return the styles of a key and its label; a key that stops a motor is red."""
     return (STOP_KEY, STOP_KEY) if action.startswith("stop") else (KEY, FAINT)
 
 
 def key_line(
     keys: Sequence[KeyLabel], styles: Callable[[str], tuple[Style, Style]] = key_styles
 ) -> Text:
-    """Keys and what they do, on one line; `styles` of a key and its words, by the action."""
+    """The key bar; `styles` returns the styles of a key and its label for an action."""
     text = Text(no_wrap=True)
     for index, (action, key, does) in enumerate(keys):
         drawn, words = styles(action)
@@ -151,14 +159,14 @@ def key_line(
 
 
 def armed_text(armed: float | None, *, lost: bool = False) -> Text:
-    """Return whether a drive is armed, and for how many seconds more."""
+    """Return `ARMED` with the remaining seconds, or `NOT ARMED`; in amber if arming was `lost`."""
     if armed is None:
         return Text(" NOT ARMED  ", ALARM if lost else STRONG)
     return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
 
 
 def pair(label: str, value: str, style: Style = PLAIN, width: int = 12) -> Text:
-    """A dim label and its value, behind a label of `width`."""
+    """A dim label of `width` cells, followed by its value."""
     text = Text(no_wrap=True)
     text.append(f"{label:<{width}}", FAINT)
     text.append(value, style)

@@ -19,15 +19,15 @@ _JOINS: Final = re.compile(r"(?<=[^\W\d_])-(?=\w|$)|(?<=\w)-(?=[^\W\d_])")
 
 
 class Field(Input):
-    """A field of one line; a space belongs to the text."""
+    """An input field of one line; Space types a space."""
 
     def update_node_styles(self, animate: bool = True) -> None:
-        """Nothing is styled before it is on a screen: then it is, as a whole."""
+        """Skip styling until the field is on a screen, which then styles all of it."""
         if self.is_attached:
             super().update_node_styles(animate)
 
     takes_space: ClassVar[bool] = True
-    """True if Space is typed into it; where it is not, Space stops the motor there too."""
+    """True if Space is text in this field; if False, Space stops the motor."""
 
     def check_consume_key(self, key: str, character: str | None) -> bool:
         """Space stops the motor where it is not a character of the text."""

@@ -1,4 +1,4 @@
-"""A thin bar with its ends, the value from zero and a mark for what is wanted; pure functions."""
+"""A thin bar with end marks, filled from zero to the value, with a mark for the reference. Pure."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def gauge(
     mark: float | None = None,
     style: Style = BAR,
 ) -> Text:
-    """A bar of exactly so many cells, filled from zero (or the low end) to the value.
+    """A bar of exactly `width` cells, filled from zero (or the low end) to the value.
 
-    With a low end below zero, zero is within it and has a sign of its own.
+    If the low end is below zero, zero has a sign of its own inside the bar.
     """
     inner = max(1, width - 2)
     cells = [("─", BAR_REST)] * inner
@@ -38,12 +38,12 @@ def gauge(
 
 
 def _halves(value: float, low: float, high: float, inner: int) -> int:
-    """The place of a value, in halves of a cell."""
+    """The position of a value, in halves of a cell."""
     return round((max(low, min(high, value)) - low) / (high - low) * inner * 2)
 
 
 def _cell(at: int, start: int, end: int, style: Style) -> tuple[str, Style]:
-    """A cell, filled from half to half where it lies between the two."""
+    """The cell `at`; `start` and `end` of the filled part are in halves of a cell."""
     left, right = start <= 2 * at < end, start <= 2 * at + 1 < end
     if left and right:
         return "━", style

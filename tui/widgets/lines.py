@@ -29,23 +29,23 @@ class Lines(Widget):
         classes: str | None = None,
         fit: Callable[[int], Sequence[Text]] | None = None,
     ) -> None:
-        """With `fit` the first lines are made for the width that the place turns out to have."""
+        """`fit` makes the first lines, once the width of the widget is known."""
         super().__init__(id=id, classes=classes)
         self._fit = fit
         self._lines: list[Text] = []
         self._strips: dict[int, Strip] = {}
         self._under: Style | None = None
-        """The colors of the place itself; to ask for them costs more than to draw a line."""
+        """The background style of the widget; cached, as reading it costs more than a line."""
         self.redrawn = 0
-        """Number of lines sent so far, for tests and benchmarks."""
+        """Number of lines redrawn so far, for tests and benchmarks."""
 
     @property
     def lines(self) -> list[Text]:
-        """Lines that are shown."""
+        """The lines shown now."""
         return list(self._lines)
 
     def show(self, lines: Sequence[Text]) -> None:
-        """Show these lines; only those that differ from the ones before are drawn."""
+        """Show these lines; only lines that differ from the present ones are drawn."""
         old, self._fit = self._lines, None
         self._lines = list(lines)
         changed = [
@@ -62,7 +62,7 @@ class Lines(Widget):
             self.refresh(layout=True)
 
     def _redraw(self, y: int, width: int) -> list[Region]:
-        """Draw a line again; the parts of it that look different now."""
+        """Draw a line again, and return the regions in which it looks different."""
         before = self._strips.pop(y, None)
         if not width:
             return []
@@ -70,12 +70,12 @@ class Lines(Widget):
         return [Region(x, y, end - x, 1) for x, end in runs(before, self._strips[y])]
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
-        """One row a line."""
+        """One row per line."""
         self._fill(width)
         return len(self._lines)
 
     def _fill(self, width: int) -> None:
-        """Make the first lines, now that there is a width for them."""
+        """Make the first lines, if the width is known by now."""
         if self._fit is not None and width:
             self._lines = list(self._fit(width))
 
@@ -86,7 +86,7 @@ class Lines(Widget):
         super().notify_style_update()
 
     def render_lines(self, crop: Region) -> list[Strip]:
-        """The lines of a region; nothing surrounds them, so Textual need not look for it."""
+        """The lines of a region; without a border, so most of Textual's work is skipped."""
         width = self.size.width
         if self.size != self.outer_size:
             return super().render_lines(crop)
@@ -99,7 +99,7 @@ class Lines(Widget):
         return strips
 
     def render_line(self, y: int) -> Strip:
-        """A line, cut or filled to the width."""
+        """A line, cut or padded to the width."""
         return self._strip(y, self.size.width)
 
     def _strip(self, y: int, width: int) -> Strip:
@@ -129,9 +129,9 @@ def _names_of_styles() -> Console:
 def strip_of(
     text: str, spans: tuple[Span, ...], style: Style | str, width: int, under: Style
 ) -> Strip:
-    """A line in exactly so many cells, on the colors of its place.
+    """A line in exactly `width` cells, over the style `under`.
 
-    Kept for when it comes again: most of what changes becomes what it was before.
+    Cached, because most lines that change return to an earlier text.
     """
     text = plain(text)
     segments = piece_by_piece(text, spans, style)
@@ -146,7 +146,7 @@ def strip_of(
 
 
 def piece_by_piece(text: str, spans: Sequence[Span], style: Style | str) -> list[Segment] | None:
-    """The pieces of a text that was put together piece by piece; None for any other."""
+    """The segments of a text whose spans do not overlap; None for any other text."""
     if not isinstance(style, Style):
         if style:
             return None
@@ -167,9 +167,9 @@ def piece_by_piece(text: str, spans: Sequence[Span], style: Style | str) -> list
 
 
 def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
-    """Columns, first and behind the last, in which two strips of one row differ.
+    """Column ranges, each as first and one after last, in which two strips of a row differ.
 
-    Runs with little between them are one: to move costs as much as to write some cells again.
+    Ranges with a short gap are merged: moving the cursor costs as much as writing a few cells.
     """
     if before is after:
         return []
@@ -189,7 +189,7 @@ def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
 
 
 def looks(strip: Strip) -> tuple[str, list[Style | None]]:
-    """The characters of a strip, and their colors; fewer than its cells where some are wide."""
+    """The characters of a strip and their styles; fewer than its cells if some are wide."""
     styles: list[Style | None] = []
     for text, style, _ in strip:
         styles += [style] * len(text)
@@ -197,7 +197,7 @@ def looks(strip: Strip) -> tuple[str, list[Style | None]]:
 
 
 def same(text: Text, other: Text) -> bool:
-    """Return True if two lines look the same, their colors too."""
+    """Return True if two lines look the same, including their colors."""
     if text is other:
         return True
     return text.plain == other.plain and text.spans == other.spans and text.style == other.style

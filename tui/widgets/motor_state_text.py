@@ -24,10 +24,10 @@ HEADLINE_WIDTH = 18
 def motor_state_text(
     profile: Profile, snapshot: Snapshot | None, period: float, look: Look | None, now: float
 ) -> Text:
-    """State, frequency and current of the last cycle, or of the line watch's look at the drive.
+    """State, frequency and current of the last cycle, or the state that the line watch read.
 
-    `period` is the wished time of a cycle in seconds, `now` is monotonic. A value older than three
-    cycles, or with an error, is shown as past, with its age.
+    `period` is the intended time of a cycle in seconds, `now` is monotonic. A state older than
+    three cycles, or with an error, is shown as unknown, with its age.
     """
     if snapshot is None or (look is not None and look.time > snapshot.time):
         return _by_look(look, now)

@@ -1,4 +1,4 @@
-"""Colors and signs of the panel: grey while all is well, color for a state to be seen."""
+"""Colors and signs of the panel: gray while all is well, color for a state that needs attention."""
 
 from __future__ import annotations
 

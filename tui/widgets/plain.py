@@ -1,6 +1,6 @@
-"""Text on the screen that is text: never markup, never a command to the terminal.
+"""Text shown as it is written: never as markup, never as a command to the terminal.
 
-What people, drives, files and profiles write passes through here on its way to Textual's
+All text from people, drives, files and profiles passes through here on its way to Textual's
 widgets, which would read brackets in a `str` as markup.
 """
 
@@ -16,7 +16,7 @@ from tui.drive.plain import plain
 
 
 class Plain(Label):
-    """A label that shows a text as it is written."""
+    """A label without markup."""
 
     def __init__(
         self, content: VisualType = "", *, id: str | None = None, classes: str | None = None
@@ -24,19 +24,19 @@ class Plain(Label):
         super().__init__(written(content), markup=False, id=id, classes=classes)
 
     def update(self, content: VisualType = "", *, layout: bool = True) -> None:
-        """Show another text."""
+        """Replace the text."""
         super().update(written(content), layout=layout)
 
 
 def written(content: VisualType) -> VisualType:
-    """A `str` or `Text` with its control characters as signs; anything else as it is."""
+    """A `str` or `Text` with its control characters as symbols; anything else unchanged."""
     if isinstance(content, str):
         return plain(content, lines=True)
     return signs(content) if isinstance(content, Text) else content
 
 
 def signs(text: Text) -> Text:
-    """The same text, in the same colors, with its control characters as signs."""
+    """The same text, in the same colors, with its control characters as symbols."""
     if text.plain.replace("\n", "").isprintable():
         return text
     shown = text.copy()
@@ -50,7 +50,7 @@ def entry(text: Text, *, id: str | None = None, disabled: bool = False) -> Optio
 
 
 class Signs(Highlighter):
-    """Shows the control characters in a field as signs."""
+    """Shows the control characters in a field as symbols."""
 
     def highlight(self, text: Text) -> None:
         """Replace them, one for one."""

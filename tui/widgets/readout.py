@@ -22,7 +22,7 @@ GLYPHS: Mapping[str, tuple[str, str, str]] = {
     ".": (" ", " ", "."),
     " ": (" ", " ", " "),
 }
-"""By character, its three rows; a minus is two cells wide, a point one."""
+"""The three rows of each character; a minus is two cells wide, a point one."""
 PLAIN_GLYPHS: Mapping[str, tuple[str, str, str]] = {
     "0": (" _ ", "| |", "|_|"),
     "1": ("   ", "  |", "  |"),
@@ -38,22 +38,22 @@ PLAIN_GLYPHS: Mapping[str, tuple[str, str, str]] = {
     ".": (" ", " ", "."),
     " ": (" ", " ", " "),
 }
-"""The same in ASCII, for terminals that have no more."""
+"""The same in ASCII, for terminals without box characters."""
 DASH = ("   ", "╶─╴", "   ")
-"""One place of a number that is not there."""
+"""One digit of a missing number."""
 
 
 def readout_cells(decimals: int, *, signed: bool, whole: int = 3) -> int:
-    """The width that a number of so many digits takes."""
+    """The width of a number with this many digits before and after the point."""
     point = 1 + DIGIT_CELLS * decimals if decimals else 0
     return (2 if signed else 0) + DIGIT_CELLS * whole + point
 
 
 def big(text: str, width: int, *, plain: bool = False) -> list[str]:
-    """A number in three rows, to the right of exactly so many cells.
+    """A number in three rows, right-aligned in exactly `width` cells.
 
-    What is too wide loses decimals first; texts other than numbers, and those still too wide, are
-    in the lowest row unchanged. With `plain` it is drawn in ASCII.
+    A number that is too wide loses decimals first. If it is still too wide, or is not a number, the
+    text is shown small in the lowest row. With `plain` it is drawn in ASCII.
     """
     glyphs = PLAIN_GLYPHS if plain else GLYPHS
     for shown in _shorter(text):
@@ -64,12 +64,12 @@ def big(text: str, width: int, *, plain: bool = False) -> list[str]:
 
 
 def dashes(width: int) -> list[str]:
-    """Three dashes in the place of a number that is not known."""
+    """Three dashes instead of an unknown number."""
     return ["".join(part[row] for part in (DASH,) * 3).rjust(width)[:width] for row in range(ROWS)]
 
 
 def _shorter(text: str) -> list[str]:
-    """The number itself, then with fewer and fewer decimals; nothing for what is none."""
+    """The number, then the number with fewer and fewer decimals; empty if it is not a number."""
     places = len(text.partition(".")[2])
     if not text or not set(text) <= GLYPHS.keys():
         return []

@@ -1,4 +1,4 @@
-"""Contents of a terminal too small for a screen: the motor, and the keys that stop it."""
+"""Contents of a terminal that is too small for a screen: the motor, and the keys that stop it."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LEAST_WIDTH, LEAST_HEIGHT = 60, 16
 """Columns and rows that every screen needs."""
 
 ROWS_FOR_GAPS = 10
-"""Rows from which there are empty lines between the parts."""
+"""Rows from which empty lines separate the parts."""
 
 STOPS = (("Space", ""), ("F12", ""), ("F9", "STOP ALL"))
 
@@ -35,9 +35,9 @@ def is_too_small(width: int, height: int) -> bool:
 
 
 def small_lines(view: StripView, target: str, width: int, height: int) -> list[Text]:
-    """The state first, then figures, keys, and last the sentence; what does not fit is left out.
+    """The state, the figures, the stop keys and the sentence; the end is dropped if too long.
 
-    `whom` says whom the stop key stops.
+    `target` is the label of the stop key.
     """
     drive = view.drive
     lines = (
@@ -59,7 +59,7 @@ def small_lines(view: StripView, target: str, width: int, height: int) -> list[T
 
 
 def _drive_lines(drive: DriveNow, width: int) -> list[Text]:
-    """State, figures with their units, and its identity."""
+    """State, figures with their units, and the name."""
     style = STRIP_STYLES.get(drive.kind, STRONG)
     state = f"{STATE_SIGNS.get(drive.kind, '□')} {drive.words}"
     if drive.age is not None:
@@ -79,7 +79,7 @@ def _drive_lines(drive: DriveNow, width: int) -> list[Text]:
 
 
 def _keys(target: str, width: int) -> list[Text]:
-    """The keys that stop, on as many lines as they take."""
+    """The stop keys, on as many lines as they need."""
     lines = [Text()]
     for key, label in STOPS:
         part = Text(f" {key} {label or target} ", STOP_KEY)

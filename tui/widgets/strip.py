@@ -1,6 +1,6 @@
-"""The first two lines of every screen: what the open drive does, and where the keys 1 to 7 lead.
+"""Status bar, tabs and message line of every screen, as lines. Pure functions.
 
-Every part has its place, so that nothing moves when a value changes. Pure functions.
+Every part has a fixed place, so that nothing moves when a value changes.
 """
 
 from __future__ import annotations
@@ -36,17 +36,17 @@ from .palette import (
 
 STATE_WIDTH = 14
 VALUES_WIDTH = 26
-"""`123.4 → 123.4 Hz  123.4 A`, each at its place."""
+"""Cells of `123.4 → 123.4 Hz  123.4 A`."""
 RIGHT_WIDTH, MIDDLE_RIGHT, NARROW_RIGHT = 24, 21, 13
-"""Kept for the faults of the line and for ARMED, whether they are there or not."""
+"""Cells reserved for the number of faults and for ARMED, by the width of the terminal."""
 NARROW, MIDDLE, WIDE = 72, 86, 100
-"""Columns below which these are short, and from which a trouble of the line has its own place."""
+"""Columns below which texts are shortened, and from which line trouble has its own place."""
 LOAD_WIDTH = 12
-"""Cells of the load of the line; on fewer than `WIDE` columns a trouble of the line is there."""
+"""Cells of the load of the line; below `WIDE` columns, line trouble replaces the load."""
 NAME_WIDEST = 44
 BETWEEN = " · "
 NAME_LEAST = 12
-"""Cells that the end of a line's name keeps; where that is too many it is cut behind."""
+"""Cells of a line's name that are always shown; with less room, the end of the text is cut."""
 STRIP_STYLES: Mapping[str, Style] = {
     "running": RUNNING,
     "fault": FAULT_BLOCK,
@@ -64,7 +64,7 @@ class DriveNow(NamedTuple):
     """Name that it reports; empty if none."""
     model: str
     kind: str
-    """Kind of its state, or `stop` while one is on its way, `stop failed` where it is none."""
+    """Kind of its state; `stop` during a stop, `stop failed` if the motor did not stop."""
     words: str
     frequency: str = ""
     reference: str = ""
@@ -72,9 +72,9 @@ class DriveNow(NamedTuple):
     current: str = ""
     current_unit: str = "A"
     age: float | None = None
-    """Seconds since it was heard, where that is too long ago to be the present."""
+    """Seconds since the last reply if the values are old; None if they are current."""
     armed: float | None = None
-    """Seconds for which it is armed yet."""
+    """Seconds for which it stays armed; None if it is not armed."""
     by: str = ""
     """Its commander, if it is not this panel."""
     family: str = ""
@@ -82,7 +82,7 @@ class DriveNow(NamedTuple):
 
 
 class StripView(NamedTuple):
-    """All that the status bar shows."""
+    """Contents of the status bar."""
 
     drive: DriveNow | None = None
     line: str = ""
@@ -90,18 +90,18 @@ class StripView(NamedTuple):
     faults: int = 0
     """Drives of the line that are in fault."""
     unseen: bool = False
-    """True if one of the faults was not looked at yet."""
+    """True if one of the faults has not been viewed yet."""
     load: float | None = None
     clock: str = ""
     read_only: bool = False
     off_record: bool = False
     """True if the journal cannot be written."""
     trouble: tuple[str, ...] = ()
-    """A few words for a trouble of the line, the longest first; empty while it is healthy."""
+    """Texts for line trouble, the longest first; empty while the line is healthy."""
 
 
 def strip_line(view: StripView, width: int) -> Text:
-    """The first line: the open drive, or the line where none is open."""
+    """The status bar: the open drive, or the line if no drive is open."""
     right = _right(view, width)
     if view.drive is None:
         left = Text(no_wrap=True)
@@ -120,7 +120,7 @@ def strip_line(view: StripView, width: int) -> Text:
 
 
 def _line_text(line: str, room: int) -> str:
-    """The line in so many cells: its long name loses its beginning, its facts lose nothing."""
+    """The line in at most `room` cells: only its name is shortened, at the beginning."""
     name, between, more = line.partition(BETWEEN)
     left = room - cell_len(between + more)
     if cell_len(name) <= left or left < NAME_LEAST:
@@ -131,7 +131,7 @@ def _line_text(line: str, room: int) -> str:
 
 
 def _drive(drive: DriveNow, width: int) -> Text:
-    """Return its identity, state and values; the identity gets the room that the others leave."""
+    """Return identity, state and values; the identity gets the remaining room."""
     room = max(4, min(NAME_WIDEST, width - STATE_WIDTH - VALUES_WIDTH - _right_width(width)))
     who = Text(no_wrap=True)
     who.append(f"{drive.device:>2} ", FAINT)
@@ -184,7 +184,7 @@ def _values(drive: DriveNow) -> Text:
     text = Text(no_wrap=True)
     if not (drive.frequency or drive.current):
         return text.append(" " * VALUES_WIDTH)
-    # the unit first behind the reference, as both have it
+    # one unit, after the reference: both values have it
     text.append(f"{drive.frequency:>5}", style)
     text.append(f" → {drive.reference:>5}" if drive.reference else " " * 8, PLAIN)
     text.append(f" {drive.frequency_unit:<2}", FAINT)
@@ -194,7 +194,7 @@ def _values(drive: DriveNow) -> Text:
 
 
 def _right(view: StripView, width: int) -> Text:
-    """Return the part on the whole line, and whether keys move this drive's motor."""
+    """Return the right part: faults of the line, and whether this drive is armed."""
     drive, room = view.drive, _right_width(width)
     # as much as has room, the shortest form in any case
     forms = (_whole_line(view, room, level=level) for level in range(LEVELS_MOST + 1))
@@ -238,7 +238,7 @@ def _whole_line(view: StripView, room: int, *, level: int) -> Text:
 
 
 def _trouble(signs: Sequence[str], room: int) -> Text:
-    """The longest of the words for a trouble that there is room for; its sign alone, or nothing."""
+    """The longest text for line trouble that fits; the sign alone, or nothing."""
     forms = (f"▲ {sign} " if sign else "▲ " for sign in signs)
     form = next((form for form in forms if len(form) <= room), "")
     return Text(no_wrap=True).append(form, ALARM)
@@ -251,7 +251,7 @@ class Tab(NamedTuple):
     key: str
     name: str
     narrow: str
-    """Its name where the terminal is narrow."""
+    """Its name in a narrow terminal."""
 
 
 def tabs_line(
@@ -262,10 +262,10 @@ def tabs_line(
     *,
     lead: bool = True,
 ) -> Text:
-    """The second line: where the keys lead, what is there, and where we are.
+    """The tabs: key, name and mark of each screen, with the present one highlighted.
 
-    A mark is one cell between the key and the name, so it moves nothing.
-    Where the keys do not `lead` there now, as digits are typed, they are drawn dim.
+    A mark is one cell between the key and the name, so it moves nothing. The keys are dim if they
+    do not `lead` to the screens now, because digits are being typed.
     """
     names = {tab.place: tab.name for tab in tabs}
     if (gap := tab_gap(names.values(), width)) < 1:
@@ -296,7 +296,7 @@ def tab_gap(names: Collection[str], width: int) -> int:
 
 
 def message_line(when: str, message: str, style: Style, hint: str, width: int) -> Text:
-    """The last line but one: the newest event with its time, and which key shows more."""
+    """The message line: the newest event with its time, and the key that shows more."""
     text = Text(no_wrap=True)
     text.append(f" {cut(when, 8)} ", FAINT)
     room = max(8, width - text.cell_len - (len(hint) + 2 if hint else 1))
@@ -310,33 +310,33 @@ def message_line(when: str, message: str, style: Style, hint: str, width: int) -
 
 
 class BarMessage(NamedTuple):
-    """The present message; `age` in seconds."""
+    """Contents of the message line; `age` in seconds."""
 
     when: str
     text: str
     kind: str
     age: float
     there: bool = False
-    """True if it is about another drive than the one that is open."""
+    """True if it is about a drive other than the open one."""
 
 
 class FrameView(NamedTuple):
-    """All parts around a screen at one moment."""
+    """Contents of the frame around a screen at one moment."""
 
     strip: StripView
     place: str
     marks: dict[str, tuple[str, Style]]
     message: BarMessage | None
     not_stopped: tuple[str, ...] = ()
-    """A text for each motor that a stop does not stop; drawn over everything, whole."""
+    """A text for each motor that did not stop; always shown in full."""
 
     @property
     def at_once(self) -> object:
-        """Parts shown at once on a slow link too: state, stop, fault, arming, message."""
+        """Parts that a slow link shows immediately, too: state, stop, fault, arming, message."""
         strip, drive, message = self.strip, self.strip.drive, self.message
         who = drive and (drive.device, drive.kind, drive.words, drive.age is None, drive.by)
         armed = drive is not None and drive.armed is not None
-        # figures in a message count seconds
+        # a message may count seconds: its figures do not make it new
         text = message and re.sub(r"\d+", "", message.text)
         faults = strip.faults, strip.unseen, bool(strip.trouble)
         return who, armed, faults, strip.off_record, self.place, self.marks, text, self.not_stopped

@@ -1,4 +1,4 @@
-"""Keys of the Blocks screen beside its tables: files, user words, writing through outputs."""
+"""Keys of Scanner other than those of its tables: files, user words, writing through outputs."""
 
 from __future__ import annotations
 
@@ -16,11 +16,11 @@ from ..dialogs.ask import fault_of_new
 
 
 class BlockKeys(ArmingKeys):
-    """Actions of the block keys; the block editor does the work."""
+    """Actions of these keys; the block editor does the work."""
 
     @property
     def block_editor(self) -> BlockEditor:
-        """Known and proposed assignments."""
+        """Present and staged assignments."""
         return self.console.blocks
 
     def _try(self, work: Callable[[], None]) -> None:
@@ -77,12 +77,12 @@ class BlockKeys(ArmingKeys):
     # Files and user words
 
     def action_save_file(self) -> None:
-        """Ask for a file, and save what is proposed, else today's assignment."""
+        """Ask for a file, and save the assignment with its staged changes."""
         from ..dialogs.ask import Ask
 
         plans = self.block_editor.proposals.assignments
         if not plans:
-            self._refuse("Nothing was read yet that could be saved.")
+            self._refuse("Nothing to save: no slot has been read yet.")
             return
 
         def given(name: str | None) -> None:
@@ -90,7 +90,7 @@ class BlockKeys(ArmingKeys):
                 self._try(lambda: self._save(Path(name).expanduser()))
 
         proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
-        about = "The assignment shown, proposals included; one slot a line (TOML)."
+        about = "The assignment with its staged changes, one slot per line (TOML)."
         text = str(Path.cwd() / proposed)
         requested = Ask("Save to", fault_of_new, text=text, about=about, takes="Save")
         self.app.push_screen(requested, given)
@@ -106,7 +106,7 @@ class BlockKeys(ArmingKeys):
         self.app.notify(f"Saved: {path}", timeout=5)
 
     def action_load_file(self) -> None:
-        """Choose a file, and propose what it holds."""
+        """Choose a file, and stage its assignment."""
         from tui.session.paths import state_folder
 
         from ..dialogs.pick_file import PickFile
@@ -119,7 +119,7 @@ class BlockKeys(ArmingKeys):
             if name:
                 self._try(lambda: self._load(Path(name).expanduser()))
 
-        question = "Open an assignment: it is proposed, not written"
+        question = "Open an assignment. It is staged, not written."
         self.app.push_screen(PickFile(question, [], [Path.cwd(), state_folder()]), given)
 
     def _load(self, path: Path) -> None:
@@ -160,14 +160,14 @@ class BlockKeys(ArmingKeys):
             return f"{name if word.address else 'none'} {word.format}"
 
         about = (
-            "Four, with commas between: a code or address and hex, signed or unsigned."
-            " ----- means: not assigned, unknown to the drive, or protected."
+            "Four words with commas between. Each is a code or address, then hex, signed or"
+            " unsigned. ----- means: not assigned, unknown to the drive, or protected."
         )
         text = ", ".join(spelled(word) for word in self.block_editor.words)
         self.app.push_screen(Ask("User words", wrong, text=text, about=about), given)
 
     def _words_typed(self, text: str) -> UserWords:
-        """Four words from `LCR signed, W7121 hex, none`; raises DriveError."""
+        """Parse four words such as `LCR signed, W7121 hex, none`. Raises DriveError."""
         found: list[UserWord] = []
         for part in text.split(",")[:COUNT]:
             name, _, format = part.strip().partition(" ")

@@ -1,4 +1,4 @@
-"""A dialog that picks what a slot stands for: a list that filters as one types."""
+"""Dialog that chooses the parameter of a slot: a list that filters while typing."""
 
 from __future__ import annotations
 
@@ -20,19 +20,19 @@ from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
-from ..dialogs.question import Question, hint
+from ..dialogs.question import Question, hint, matches_text
 
 LISTED_MOST = 100
-"""Parameters that are listed at once; a search brings the others."""
+"""Parameters that are listed at most; a search shows the others."""
 WIDEST = 92
 """Cells of the dialog at most: the longest names fit."""
 BESIDE_NAME, AROUND = 29, 6
 """Cells of a line without its name, and of the dialog around a line."""
-PICK_HINT = hint(("Up, Down", "choose"), JOINS_KEY, ("Enter", "propose"), ("Esc", "cancel"))
+PICK_HINT = hint(("Up, Down", "Choose"), JOINS_KEY, ("Enter", "Stage"), ("Esc", "Cancel"))
 
 
 class PickParameter(Question[str | None]):
-    """Gives the code of a parameter back, `none`, or None when it was left."""
+    """Answers with the code of a parameter, with `none` to clear the slot, or with None."""
 
     BINDINGS: ClassVar = [
         Binding("up", "step(-1)", "up", show=False, priority=True),
@@ -45,22 +45,22 @@ class PickParameter(Question[str | None]):
         self._found: list[Parameter] = []
 
     def dialog(self) -> ComposeResult:
-        """A search, and what it finds."""
+        """A search field, and its results."""
         with Vertical(id="dialog"):
-            yield Plain(f"{self._slot} is mapped to", id="question")
+            yield Plain(f"Map {self._slot} to", id="question")
             yield WordField(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
             yield Plain(PICK_HINT, id="hint")
 
     def on_mount(self) -> None:
-        """Everything that the slot can stand for."""
+        """List every parameter that the slot can be mapped to."""
         options = self.query_one(OptionList)
         options.can_focus = False
         self._list("")
 
     def on_input_changed(self) -> None:
-        """Fewer, as more is typed."""
+        """List the matching parameters."""
         self._list(self.query_one(WordField).words)
 
     def _list(self, search: str) -> None:
@@ -72,9 +72,7 @@ class PickParameter(Question[str | None]):
         unused = [] if search else [Text(" none      the slot is unused", FAINT)]
         options.add_options([entry(line) for line in (*unused, *lines)])
         options.highlighted = 0 if options.option_count else None
-        more = f", first {LISTED_MOST} shown" if len(every) > LISTED_MOST else ""
-        text = f"{len(every)} matches{more}" if every else "No match. Delete some letters."
-        self.query_one("#count", Plain).update(text)
+        self.query_one("#count", Plain).update(matches_text(len(every), LISTED_MOST))
 
     def on_resize(self, _: Resize) -> None:
         """Give the names the new width; the choice stays."""
@@ -84,19 +82,19 @@ class PickParameter(Question[str | None]):
         options.highlighted = at if at is not None else options.highlighted
 
     def action_step(self, step: int) -> None:
-        """Another one of the list."""
+        """Move the cursor in the list."""
         options = self.query_one(OptionList)
         if options.option_count:
             at = (options.highlighted or 0) + step
             options.highlighted = min(max(0, at), options.option_count - 1)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Take the one that is marked."""
+        """Answer with the selected entry."""
         at = self.query_one(OptionList).highlighted
         self._take(at, searched=bool(event.value))
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Take the one that was clicked."""
+        """Answer with the clicked entry."""
         self._take(event.option_index, searched=bool(self.query_one(Input).value))
 
     def _take(self, at: int | None, *, searched: bool) -> None:

@@ -1,4 +1,4 @@
-"""Blocks: what the slots of an indirect block or scanner bring, proposed, written, compared."""
+"""Scanner: the slots of an indirect block or scanner, compared, staged and written."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from ..keys.table import bindings
 from .block_keys import BlockKeys
 
 LINES_BESIDE_SLOTS = 16
-"""Lines besides slots: the frame, headings, details, cost, words, keys."""
+"""Lines other than slots: the frame, headings, details, cost, words, keys."""
 
 ROWS_FOR = {"#words": 24, "#cost": 22}
 """Rows of the terminal from which user words and cost are shown: the slots come first."""
@@ -69,18 +69,18 @@ class BlocksScreen(BlockKeys):
         yield Lines(id="words")
 
     def on_mount(self) -> None:
-        """Begin to look."""
+        """Start reading."""
         if not self.block_editor.proposals.blocks:
             for id in ("#second", "#detail", "#cost"):
                 self.query_one(id).display = False
         self.block_editor.start()
 
     def on_unmount(self) -> None:
-        """Look no more; what is proposed stays."""
+        """Stop reading; staged slots are kept."""
         self.block_editor.stop()
 
     def draw(self, width: int) -> None:
-        """The block editor's state, and its result."""
+        """Draw the tables, the slot, its cost, and the user words."""
         super().draw(width)
         self.put("words", user_word_lines(self.block_editor, self.block_editor.words, width))
         if self.block_editor.proposals.blocks:
@@ -100,30 +100,29 @@ class BlocksScreen(BlockKeys):
             at = self._at if item is block else None
             self.put(place, table_lines(block_editor, item, each, at, double=double))
         detail = [
-            rule("Slot", width, self._proposed()),
+            rule("Slot", width, self._staged()),
             *slot_lines(block_editor, block, self._at, width),
         ]
         self.put("detail", detail if self.size.height >= ROWS_FOR_DETAIL else detail[:SHORT_DETAIL])
         self.put("cost", cost_lines(block_editor, block, block_editor.proposals.saving(), width))
 
-    def _proposed(self) -> str:
-        """Return the number and effect of proposals, or why nothing is read."""
+    def _staged(self) -> str:
+        """Return the number of staged slots with the next keys, or why nothing is read."""
         count = self.block_editor.proposals.count
-        slots = "slot" if count == 1 else "slots"
         if not count:
             return self.block_editor.trouble
-        return f"{count} {slots} proposed. {self._keys_now()}, u to discard"
+        return f"{count} staged. {self._keys_now()}, u to discard"
 
     def _keys_now(self) -> str:
-        """Name the keys that write the proposal in the present state, in a few words."""
+        """The keys that write the staged slots, as a sentence without a full stop."""
         if self.session.arming.hindrance:
-            return "cannot be written now"
+            return "Cannot be written now"
         if self._why_not_now():
             return "Stop the motor, then press w"
         return "Press w to write" if self._armed() else "Press a to arm, then w"
 
     def _why_not_now(self) -> str:
-        """Why what is proposed cannot be written in the present state; empty if it can."""
+        """Why the staged slots cannot be written in the present state; empty if they can."""
         editor = self.block_editor
         todo = [block for block in editor.proposals.blocks if editor.proposals.changes(block)]
         return next((why for block in todo if (why := editor.not_now(block))), "")
@@ -139,21 +138,21 @@ class BlocksScreen(BlockKeys):
     # Keys that move
 
     def action_move(self, step: int) -> None:
-        """Another slot."""
+        """Move the cursor by so many slots."""
         if (block := self._block) is not None:
             self._at = min(max(0, self._at + step), len(block.slots) - 1)
         self.look()
 
     def action_other_table(self) -> None:
-        """The other table."""
+        """Switch to the other table."""
         if self.block_editor.proposals.blocks:
             self._side = (self._side + 1) % len(self.block_editor.proposals.blocks)
         self.action_move(0)
 
-    # Keys that propose
+    # Keys that stage
 
     def action_pick(self) -> None:
-        """Choose what the slot stands for."""
+        """Choose the parameter that the slot is mapped to."""
         from .pick_parameter import PickParameter
 
         block, place = self._block, self._at
@@ -169,19 +168,19 @@ class BlocksScreen(BlockKeys):
         self.app.push_screen(PickParameter(self.session.profile, block, slot), reported)
 
     def action_shift(self, step: int) -> None:
-        """Move the slot's content."""
+        """Move the slot's mapping by so many slots, staged."""
         block, place = self._block, self._at
         if block is not None and 0 <= place + step < len(block.slots):
             self._try(lambda: self.block_editor.proposals.move(block, place, step))
             self.action_move(step)
 
     def action_clear(self) -> None:
-        """Propose the slot unused."""
+        """Clear the slot, staged."""
         if (block := self._block) is not None:
             self._try(lambda: self.block_editor.proposals.clear(block, self._at))
 
     def action_factory(self) -> None:
-        """Propose every slot as it left the factory."""
+        """Stage the factory assignment."""
 
         def work() -> None:
             for block in self.block_editor.proposals.blocks:
@@ -190,41 +189,41 @@ class BlocksScreen(BlockKeys):
         self._try(work)
 
     def action_best(self) -> None:
-        """Propose the slots that save most for what Monitor shows."""
+        """Stage the assignment that saves most time for Monitor."""
         found: list[Saving | None] = []
         self._try(lambda: found.append(self.block_editor.proposals.best()))
         if found and found[0] is not None:
             before, after = found[0].before.microseconds, found[0].after.microseconds
             self.app.tell(
-                f"Proposed: Monitor's cycle takes {after / 1000:.1f} ms instead of"
+                f"Staged: Monitor's cycle takes {after / 1000:.1f} ms instead of"
                 f" {before / 1000:.1f} ms."
             )
             how = self._why_not_now() or self.how_to_write("it")
             self.hint_keys(f"{how} Press u to discard it.")
         elif found:
-            self.app.tell("Nothing to propose: no other slots make Monitor's cycle shorter.")
+            self.app.tell("Nothing to suggest: no other assignment shortens Monitor's cycle.")
 
     def action_undo(self) -> None:
-        """Propose nothing."""
+        """Discard all staged slots."""
         self.block_editor.proposals.drop()
         self.look()
 
     # Keys that write
 
     def action_verify(self) -> None:
-        """Compare every slot several times."""
+        """Compare every slot with direct reads, several times."""
         if self.block_editor.proposals.blocks:
             self.block_editor.verify()
         self.look()
 
     def action_write(self) -> None:
-        """Say what follows, and write it."""
+        """Ask, then write the staged slots."""
         block_editor = self.block_editor
         proposals = block_editor.proposals
         todo = [block for block in proposals.blocks if proposals.changes(block)]
         if not todo:
-            self._refuse("Nothing is proposed.")
-            self.hint_keys("Press Enter to pick what the slot is mapped to.")
+            self._refuse("Nothing is staged.")
+            self.hint_keys("Press Enter to choose a parameter for the slot.")
             return
         wrong = [p.text for block in todo for p in refusing(proposals.problems(block))]
         wrong += [text for block in todo if (text := block_editor.not_now(block))]
@@ -234,18 +233,17 @@ class BlocksScreen(BlockKeys):
         if not self._require_armed():
             return
 
-        yes, no = "write, each slot read back", "write nothing"
         slots = "1 slot" if proposals.count == 1 else f"{proposals.count} slots"
         self._ask(
             f"Write {slots}?",
             self._follows(),
-            yes,
-            no,
+            "Write and read back",
+            "Cancel",
             block_editor.write_proposals,
         )
 
     def _follows(self) -> str:
-        """Return the pending writes and their effect on others."""
+        """Return the pending writes and their consequences."""
         profile, lines, reported = self.session.profile, [], []
         for block in self.block_editor.proposals.blocks:
             found = self.block_editor.proposals.changes(block)
@@ -258,9 +256,7 @@ class BlocksScreen(BlockKeys):
             if found and any(profile[s].storage == "ram-until-saved" for s in block.slots):
                 reported.append("Lost at power-off until saved (S).")
             if found and block.direction == "write":
-                reported.append(
-                    "What a master writes to these outputs goes elsewhere from then on."
-                )
+                reported.append("A master's writes to these outputs then reach other parameters.")
         reported.append(
             "Another master on this line may use the present assignment. Change its program, too."
         )

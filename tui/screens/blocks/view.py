@@ -1,4 +1,4 @@
-"""Blocks and scanner in lines of text: the slots, one slot's details, what it costs, the frame."""
+"""Blocks and scanner as lines: the slots, the details of one, the cost, the frame."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, S
 from tui.wire.frames import hex_text
 
 BOTH = 50
-"""Columns of a table from which it also shows the direct value."""
+"""Columns from which a table also shows the directly read value."""
 INDENT = 6
 """Cells before the second line of a slot."""
 WIDE_SLOTS = 110
@@ -37,21 +37,22 @@ VERDICT_STYLES = {
 }
 MATCH_WORDS = {
     SlotMatch.CHANGED: "changed",
-    SlotMatch.NONE: "no val",
+    SlotMatch.NONE: "no value",
     SlotMatch.UNREAD: "-",
     SlotMatch.UNUSED: "",
 }
-"""Verdicts in few characters."""
+"""Results of the comparison, in eight characters at most."""
+PENDING = "Pending: takes effect after the drive's next reset or power-up."
 
 
 def table_lines(
     block_editor: BlockEditor, block: Block, width: int, at: int | None, *, double: bool
 ) -> list[Text]:
-    """The slots of one block under its heading; `at` is the place of the cursor, if it is here."""
+    """The slots of one block under its heading; `at` is the cursor's slot, or None."""
     view = block_editor.views.get(block.id)
     plan = block_editor.proposals.plans.get(block.id)
     through = "through the block" if block.direction == "read" else "last written"
-    right = "proposed" if plan else f"{through} · direct" if width >= BOTH else ""
+    right = "staged" if plan else f"{through} · direct" if width >= BOTH else ""
     slots = view.slots if view else [Slot(code, None) for code in block.slots]
     raws = plan.raws if plan else [None] * len(slots)
     lines = [
@@ -104,7 +105,7 @@ def _slot_line(
 
 
 def _verdict(block: Block, slot: Slot) -> tuple[str, Style]:
-    """The verdict in few characters; what was last written through an output is none."""
+    """The result of the comparison, in few characters; outputs have none."""
     if slot.force is Force.PENDING:
         return "pending", ALARM
     if block.direction == "write" and slot.verdict not in (SlotMatch.CHANGED, SlotMatch.NONE):
@@ -181,7 +182,7 @@ def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) 
 def _remarks(
     block_editor: BlockEditor, view: BlockView, slot: Slot, code: str, width: int
 ) -> list[Text]:
-    """Verdict, force and problems of a slot, each a sentence."""
+    """Comparison, activation and problems of a slot, each as a sentence."""
     found = [(p.text, ALARM) for p in block_editor.proposals.problems(view.block) if p.slot == code]
     if view.block.effective == "after-reset" and slot.raw:
         found.append((_force_text(slot), ALARM if slot.force is Force.PENDING else FAINT))
@@ -197,13 +198,13 @@ def _remarks(
 
 
 def _force_text(slot: Slot) -> str:
-    """Return whether a slot of an indirect block is in force, and how that is known."""
+    """Return if a slot of an indirect block is active, and the evidence."""
     if slot.force is Force.ACTIVE:
-        return "Active: only this parameter can have brought that value; it cannot be read."
+        return "Active: only this parameter can have returned that value."
     if slot.force is Force.PENDING:
         until = f" Until then it returns {slot.returned_code}." if slot.returned_code else ""
-        return f"Pending: takes effect after the drive's next reset or power-up.{until}"
-    return "Configured. It cannot be read if this mapping is active."
+        return f"{PENDING}{until}"
+    return "Configured. The drive does not report if this mapping is active."
 
 
 def cost_lines(
@@ -221,13 +222,13 @@ def cost_lines(
         text.append("not known: slots not read yet", FAINT)
     else:
         text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
-        text.append(f" in {saving.before.requests}", FAINT)
+        text.append(_requests(saving.before.requests), FAINT)
         if _waits_for_a_reset(block_editor):
             text.append(" · after a reset", ALARM)
         if block_editor.proposals.plans:
-            text.append("  → proposed ", FAINT)
+            text.append("  → staged ", FAINT)
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
-            text.append(f" in {saving.after.requests}", FAINT)
+            text.append(_requests(saving.after.requests), FAINT)
             text.append(f"  ({_ms(-saving.microseconds, sign=True)})", ATTENTION)
         whole = microseconds(profile, wire_timing(block_editor.session), inputs, outputs)
         reported = f"   one exchange {_ms(whole)}"
@@ -245,8 +246,12 @@ def cost_lines(
     return [*lines, text, *frames]
 
 
+def _requests(count: int) -> str:
+    return " in 1 request" if count == 1 else f" in {count} requests"
+
+
 def _waits_for_a_reset(block_editor: BlockEditor) -> bool:
-    """Return True if slots hold what a block does not bring yet: the figures are those of then."""
+    """Return True if slots take effect only after a reset; the cost then applies after it."""
     views = block_editor.views.values()
     return any(slot.force is Force.PENDING for view in views for slot in view.slots)
 
@@ -275,7 +280,7 @@ def _ms(microseconds: int, *, sign: bool = False) -> str:
 
 
 def user_word_lines(block_editor: BlockEditor, words: UserWords, width: int) -> list[Text]:
-    """The four user words, two lines with their heading."""
+    """The four user words, in two lines with their heading."""
     text = Text(" ", no_wrap=True)
     room = max(10, (width - 2) // max(1, len(words)))
     for word, raw in zip(words, block_editor.word_raws, strict=False):
@@ -292,7 +297,7 @@ def user_word_lines(block_editor: BlockEditor, words: UserWords, width: int) -> 
 def stretch_lines(
     block_editor: BlockEditor, found: Sequence[Stretch], width: int, room: int
 ) -> list[Text]:
-    """For a family without blocks: which neighbors come best in one request."""
+    """For a family without blocks: the adjacent words that are best read in one request."""
     lines: list[Text] = []
     for stretch in found:
         request = stretch.request
@@ -307,5 +312,5 @@ def stretch_lines(
             text = f"also read: {', '.join(stretch.beside)}"
             lines += [Text(f"    {t}", FAINT) for t in wrapped(text, width - 5, 1)]
     if not found:
-        lines = [Text(" No two values of the monitoring set lie close enough together.", FAINT)]
+        lines = [Text(" No two values of the monitoring set are close enough together.", FAINT)]
     return lines[:room]

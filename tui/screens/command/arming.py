@@ -58,10 +58,10 @@ class ArmingKeys(PanelScreen):
         *,
         by_itself: bool = False,
     ) -> Confirm:
-        """Ask with `y` before something is written or moved; refusals are shown on this screen.
+        """Ask for `y` before something is written or moved; refusals are shown on this screen.
 
-        `work` gets the drive's count of stops of the moment of asking: a stop since voids it.
-        `refused` is called for a no. A question that no key has asked for comes `by_itself`.
+        `work` gets the drive's stop count from the time of the question: a later stop cancels it.
+        `refused` is called for a no. `by_itself`: no key opened the question.
         """
         from ..dialogs.confirm import Confirm
 
@@ -88,7 +88,7 @@ class ArmingKeys(PanelScreen):
         return self.commander.armed_for is not None
 
     def _require_armed(self) -> bool:
-        """Return True if the drive is armed; otherwise a message says so."""
+        """Return True if the drive is armed; otherwise report how to arm it."""
         if not self._armed():
             self._refuse(self.session.arming.hindrance or self._how_to_arm())
         return self._armed()
@@ -97,19 +97,20 @@ class ArmingKeys(PanelScreen):
         other = self.session.line.facts.commander(self.session.device)
         if other is None:
             return NOT_ARMED
-        return f"Not armed: {other.text} commands this drive. Press a to ask for it."
+        return f"Not armed: {other.text} commands this drive. Press a to request it."
 
     def how_to_write(self, what: str) -> str:
-        """The keys that write what is staged, as they work now; or why none does."""
+        """The keys that write staged values now; or why writing is not possible."""
         if why := self.session.arming.hindrance:
             return why
-        arm = "" if self._armed() else "a to arm, then "
-        return f"Press {arm}w to write {what}."
+        if self._armed():
+            return f"Press w to write {what}."
+        return f"Press a to arm, then w to write {what}."
 
     def action_arm(self) -> None:
-        """Let commands and writes to this drive through for a minute, or for a minute more.
+        """Arm the drive for 60 s, or restart the 60 s.
 
-        Where another program commands it, a question goes there instead.
+        If another program commands it, ask to request the drive instead.
         """
         if (other := self.session.line.facts.commander(self.session.device)) is not None:
             self._ask_for(other)
@@ -127,7 +128,7 @@ class ArmingKeys(PanelScreen):
         self.look()
 
     def _ask_for(self, other: Program) -> None:
-        """Ask the program that commands the drive to leave it."""
+        """Ask, then request the drive from the program that commands it."""
         fleet, device = self.app.fleet, self.session.device
         if fleet is None:
             return
@@ -137,35 +138,34 @@ class ArmingKeys(PanelScreen):
 
         self._ask(
             f"Request drive {device}?",
-            f"It is commanded by {other.text}. The question is answered there; without an answer"
-            " it is a no while the motor runs.",
+            f"{other.text} commands it and must agree. No answer means no while the motor runs.",
             "Request",
             "Cancel",
             ask,
         )
 
     def action_answer_request(self) -> None:
-        """Answer a program that asks to command this drive."""
+        """Answer a program that requests this drive."""
         fleet, device = self.app.fleet, self.session.device
         request = fleet.handover.requests.get(device) if fleet is not None else None
         if fleet is None or request is None:
-            self._refuse("No program asks for this drive.")
+            self._refuse("No program requests this drive.")
             return
 
         def give(_stamp: int) -> None:
             fleet.handover.answer(request, yes=True)
 
         self._ask(
-            f"Give drive {device} away?",
-            f"{request.program.text} requests it. Its motor continues unchanged; from then on"
-            " that program commands it.",
-            "Give",
+            f"Hand drive {device} over?",
+            f"{request.program.text} requests it and will command it. The motor continues"
+            " unchanged.",
+            "Hand over",
             "Cancel",
             give,
             refused=lambda: fleet.handover.answer(request, yes=False),
         )
 
     def action_disarm(self) -> None:
-        """Let nothing through any more."""
+        """Disarm the drive."""
         self.session.arming.disarm()
         self.look()

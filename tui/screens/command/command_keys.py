@@ -28,11 +28,11 @@ from .teaching import PickWord, TeachKeys, words_to_teach
 if TYPE_CHECKING:
     from ..dialogs.now import MotorStates
 
-OPTION_HINT = hint(("Up, Down", "choose"), ("y", "write"), ("Esc or q", "cancel"))
+OPTION_HINT = hint(("Up, Down", "Choose"), ("y", "Write"), ("Esc or q", "Cancel"))
 
 
 class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
-    """A list of every choice; gives the one under the cursor back for `y`, or None."""
+    """A list of all choices; answers with the selected one for `y`, else with None."""
 
     BINDINGS: ClassVar = [Binding("y", "yes", show=False), Binding("o", "no", show=False)]
 
@@ -62,12 +62,12 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
             yield Plain(OPTION_HINT, id="hint")
 
     def on_option_list_option_selected(self) -> None:
-        """Enter writes nothing: say which key does."""
+        """Show which keys answer, as Enter writes nothing."""
         reported = Text("Press y or Esc.   ", ALARM)
         self.tell_keys(reported.append_text(OPTION_HINT))
 
     def action_yes(self) -> None:
-        """Give the choice back."""
+        """Answer with the choice."""
         at = self.query_one(OptionList).highlighted
         if at is not None:
             option, bits, _ = self._choices[at]
@@ -75,45 +75,46 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
 
 
 def option_line(option: CommandOption, bits: int, name: str, raws: Mapping[str, int]) -> Text:
-    """One choice, with a mark where the drive holds it now."""
+    """One choice, with a mark if it is the drive's present one."""
     raw = raws.get(option.parameter)
     held = raw is not None and raw & option.mask == bits
     text = Text(no_wrap=True)
     text.append(" ● " if held else " · ", STRONG if held else FAINT)
     text.append(f"{option.name:<18}", FAINT)
     text.append(f"{name:<16}", STRONG if held else PLAIN)
-    text.append(f"{option.parameter}{'  stopped only' if option.stopped_only else ''}", FAINT)
+    text.append(f"{option.parameter}{'  at standstill' if option.stopped_only else ''}", FAINT)
     return text
 
 
 SHOWN_DONE = 8.0
 SHOWN_REFUSED = 20.0
 """Seconds for which the result of a command is shown."""
+REMOVE_CAUSE = "Remove the cause first."
 
 
 STOPS_THAT_ASK = {
     "freewheel": (
         "Coast to a stop?",
-        "The output is switched off: nothing brakes the motor; a hoist load falls.",
-        "coast",
+        "The output is switched off. Nothing brakes the motor; a hoist load falls.",
+        "Coast",
     ),
     "dc-braking": (
         "Brake by direct current?",
-        "Direct current heats the motor; it holds no load at standstill.",
-        "brake",
+        "Direct current heats the motor. It holds no load at standstill.",
+        "Brake",
     ),
 }
-"""Question, what follows and the yes of the stops that need no arming but ask."""
+"""Question, consequence and label of yes, for stops that need no arming but ask first."""
 
 
 class OrderKeys(TeachKeys):
-    """The actions of the keys; everything else is the commander's."""
+    """Actions of the command keys; the commander does the work."""
 
     _requested: Outcome | None = None
-    """The refusal that a person was asked about last."""
+    """The refusal that the last question was about."""
 
     def control(self, now: float) -> Control:
-        """Return whether and how this panel commands the drive."""
+        """Return the state of this panel's control of the drive."""
         commander, raws = self.commander, self.session.image.raws
         outcome = commander.outcome
         if outcome is not None:
@@ -130,17 +131,17 @@ class OrderKeys(TeachKeys):
         )
 
     def _offer(self) -> str:
-        """A motor that an earlier program has started, and the keys that stop and take it over."""
+        """A motor left running by an exited program, and the keys that stop it and take it over."""
         fleet = self.app.fleet
         text = fleet.left_behind(self.console) if fleet is not None else ""
-        return f"{text} Space stops it, T takes it over." if text else ""
+        return f"{text} Press Space to stop it, T to take it over." if text else ""
 
     def action_take_over(self) -> None:
-        """Look after a motor that an earlier program has started."""
+        """Take over a motor left running by an exited program."""
         self._give(self.commander.take_over)
 
     def ask_unrecorded(self) -> None:
-        """Ask once whether to run although the start cannot be recorded."""
+        """Ask once to run although the start cannot be recorded."""
         from tui.session.starts.record import StartNotRecorded, StartOvertaken
 
         outcome, starts = self.commander.outcome, self.session.starts
@@ -158,7 +159,7 @@ class OrderKeys(TeachKeys):
             starts.unrecorded = True
             self.commander.run(order, reference, stamp)
 
-        question, why = f"Run {order} unrecorded?", str(outcome.error)
+        question, why = f"Run {order} without a record of the start?", str(outcome.error)
         self._ask(question, why, "Run", "Cancel", run, by_itself=True)
 
     def _refuse(self, text: str) -> None:
@@ -166,7 +167,7 @@ class OrderKeys(TeachKeys):
         self.look()
 
     def action_reset(self) -> None:
-        """Reset a fault, after saying what may start then; without a fault, say so."""
+        """Ask, then reset the fault; report if there is none."""
         profile, raws = self.session.profile, self.session.image.raws
         chart, latest = chart_in_force(profile, raws), self.console.latest
         if chart is not None and latest is not None and not latest.error:
@@ -176,7 +177,7 @@ class OrderKeys(TeachKeys):
                 return
         if not self._require_armed():
             return
-        follows = f"The cause must be gone. {reset_follows(profile, raws, {})}"
+        follows = f"{REMOVE_CAUSE} {reset_follows(profile, raws, {})}"
         work = partial(self.commander.order, "reset")
         question = self._ask("Reset the fault?", follows, "Reset", "Cancel", work)
 
@@ -184,15 +185,15 @@ class OrderKeys(TeachKeys):
             try:
                 found = await self.console.read(reset_codes(profile))
             except LineError:
-                return  # the text says that the inputs were not read
+                return  # the question says that the inputs have not been read
             now = {code: r.raw for code, r in found.items() if r.raw is not None}
             known = {**self.session.image.raws, **now}
-            question.tell_follows(f"The cause must be gone. {reset_follows(profile, known, now)}")
+            question.tell_follows(f"{REMOVE_CAUSE} {reset_follows(profile, known, now)}")
 
         self.run_worker(look_at_inputs, exclusive=True, group="reset")  # type: ignore[arg-type]
 
     def action_take_control(self) -> None:
-        """Take the control from the terminals, after saying what that means."""
+        """Ask, then take control from the terminals."""
         if self._require_armed():
             follows = (
                 "The stop of the terminals and the keypad will have no effect."
@@ -202,28 +203,28 @@ class OrderKeys(TeachKeys):
             self._ask("Take control?", follows, "Take control", "Cancel", work)
 
     def action_step_reference(self, steps: int) -> None:
-        """Raise or lower the reference by so many Hz; arrows that came at once are one step."""
+        """Raise or lower the reference by so many Hz; arrows that arrive together step once."""
         stroke = self.app.stroke
         if stroke is None or stroke.steps:
             self._give(lambda: self.commander.step(Decimal(steps)))
 
     def action_hand_back(self) -> None:
-        """Give the control back, after saying what may start then."""
+        """Ask, then return control to the terminals."""
         if self._require_armed():
             follows = (
                 "This does not stop the motor. Command and reference go back to the terminals or"
-                " the keypad: a run command active there starts it."
+                " the keypad. A run command active there starts the motor."
             )
             work = partial(self.commander.order, "hand-back")
             self._ask("Return control?", follows, "Return control", "Cancel", work)
 
     def action_stop_as(self, id: OrderId) -> None:
-        """Stop the drive in another way than on its ramp; needs no arming."""
+        """Stop the drive by another kind of stop than on its ramp; needs no arming."""
         self.app.stop_drive(self.console, id)
         self.look()
 
     def action_ask_stop_as(self, id: OrderId) -> None:
-        """Let the motor coast, or brake it, after saying what that means; needs no arming."""
+        """Ask, then let the motor coast or brake it; needs no arming."""
         charts = self.session.profile.data.charts
         if not any(order.id == id for chart in charts for order in chart.orders):
             name = {"freewheel": "let the motor coast", "dc-braking": "brake by direct current"}
@@ -231,15 +232,15 @@ class OrderKeys(TeachKeys):
             return
         question, follows, yes = STOPS_THAT_ASK[id]
         stop = partial(self.app.stop_drive, self.console, id)
-        self._ask(question, follows, yes, "cancel", lambda _stamp: stop())
+        self._ask(question, follows, yes, "Cancel", lambda _stamp: stop())
 
     def action_teach(self) -> None:
-        """Choose a raw value of this screen, and say what the drive's display shows for it."""
+        """Choose a raw value, and learn its scale from the drive's display."""
         profile = self.session.profile
         watched = [value.parameter for value in profile.data.monitoring.values]
         codes = words_to_teach(profile, watched)
         if not codes:
-            self._refuse("Nothing here is shown raw: every value has its scale from a document.")
+            self._refuse("No value here needs a learned scale: documents give all scales.")
             return
 
         def chosen(code: str | None) -> None:
@@ -249,7 +250,7 @@ class OrderKeys(TeachKeys):
         self.app.push_screen(PickWord(self.console, codes, self.motor_state_text()), chosen)
 
     def action_reference_by(self) -> None:
-        """Let a taught preset take the reference, or no more, after saying what that means."""
+        """Ask, then set the reference through a learned preset, or end that."""
         from tui.session.command.reference import no_place
 
         if code := self.teacher.reference:
@@ -259,17 +260,17 @@ class OrderKeys(TeachKeys):
         elif self.session.profile.data.teachable_references:
             self._refuse(no_place(self.session.profile, "Hz"))
         else:
-            self._refuse(f"{self.session.profile.name} takes no reference that has to be taught.")
+            self._refuse(f"{self.session.profile.name} needs no learned scale for its reference.")
 
     def action_options(self) -> None:
-        """Choose a ramp, a preset speed, a motor, an output."""
+        """Choose a ramp, a preset speed, a motor or an output."""
 
         if not self._require_armed():
             return
         raws = self.session.image.raws
         chart = chart_in_force(self.session.profile, raws)
         if chart is None or not chart.options:
-            self._refuse("This drive has no options of its commands.")
+            self._refuse("This drive has no command options.")
             return
 
         stamp = self.session.work.stops

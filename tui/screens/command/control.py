@@ -1,4 +1,4 @@
-"""True if and how a drive is commanded from here, as a screen shows it."""
+"""This panel's control of a drive, as a screen shows it."""
 
 from __future__ import annotations
 
@@ -14,33 +14,33 @@ from tui.session.work import Outcome
 
 @dataclass(frozen=True, slots=True)
 class Hindrance:
-    """Why a run command would have no effect now, and the way out of that."""
+    """Why a run command would have no effect now, and the remedy."""
 
     text: str
     way: str
-    """A sentence: the key that opens the way, else what is to be done at the drive."""
+    """The remedy as a sentence: a key of the panel, or work at the drive."""
     by_channel: bool = False
-    """True if somebody else commands the drive."""
+    """True if another source commands the drive."""
 
     @property
     def sentence(self) -> str:
-        """All of it."""
+        """Reason and remedy."""
         return f"{self.text} {self.way}".strip()
 
 
 @dataclass(frozen=True, slots=True)
 class Control:
-    """True if and how the drive is commanded from here."""
+    """State of this panel's control of a drive."""
 
     armed_for: float | None = None
-    """Seconds for which it is armed yet; None when it is not."""
+    """Seconds for which it stays armed; None if it is not armed."""
     why_disarmed: str = ""
     outcome: Outcome | None = None
-    """Result of the last command, while it is new."""
+    """Result of the last command, while it is shown."""
     hindrance: Hindrance | None = None
-    """Why a run command would have no effect now; None where it would."""
+    """Why a run command would have no effect now; None if it would have one."""
     offer: str = ""
-    """Motor that an earlier program left running, and how it is taken over."""
+    """A motor that an exited program left running, and the keys for it."""
     barred: str = ""
     """Why the drive cannot be armed from this panel; empty if it can."""
     lost: str = ""
@@ -48,7 +48,7 @@ class Control:
 
 
 UNARMED = Control()
-"""Nothing is known yet."""
+"""State before anything is known."""
 
 
 def hindrance(profile: Profile, raws: Mapping[str, int]) -> Hindrance | None:

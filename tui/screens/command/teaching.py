@@ -1,4 +1,4 @@
-"""Keys that teach a raw value by the drive's own display, on every screen that shows one."""
+"""Keys that learn the scale of a raw value from the drive's own display."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
     from ..dialogs.now import MotorStates
 
-HOW = "Type it with its unit: 50.3Hz, 8.4A, 1450rpm. The word is read when Enter is pressed."
+HOW = "Type it with its unit: 50.3Hz, 8.4A, 1450rpm. Enter reads the raw value at that moment."
 WIDEST_LIST, AROUND_LIST = 70, 6
 """Cells of the dialog at most, and those around a line of its list."""
 BESIDE_WORD = 30
@@ -39,11 +39,11 @@ BESIDE_WORD = 30
 
 
 class TeachKeys(ArmingKeys):
-    """Asks what the display shows; nothing is written to the drive."""
+    """Asks what the drive's display shows; nothing is written to the drive."""
 
     @property
     def teacher(self) -> Teacher:
-        """Taught scales of this drive."""
+        """Learned scales of this drive."""
         return self.console.teacher
 
     def ask_look(self, code: str) -> None:
@@ -84,31 +84,33 @@ class TeachKeys(ArmingKeys):
         self.look()
 
     def ask_reference(self, code: str, *, by_itself: bool = False) -> None:
-        """Ask whether a taught parameter shall take the reference from now on."""
+        """Ask to set the reference through a parameter with a learned scale."""
         from tui.session.teaching.teacher import reference_asks
 
         def confirm(_stamp: int) -> None:
             self.run_worker(self._settle(lambda: self.teacher.confirm_reference(code)))
 
         follows = reference_asks(self.session.family, code)
-        question = f"Give the reference by {code}?"
+        question = f"Set the reference through {code}?"
         self._ask(question, follows, "Use", "Cancel", confirm, by_itself=by_itself)
 
     def ask_no_reference(self, code: str) -> None:
-        """Ask whether a taught parameter shall take the reference no longer."""
+        """Ask to stop setting the reference through a parameter."""
 
         def drop() -> str:
             self.teacher.drop_reference()
-            return f"{code} takes the reference no longer."
+            return f"{code} no longer sets the reference."
 
         def confirmed(_stamp: int) -> None:
             self.run_worker(self._settle(drop))
 
-        follows = "Commands to run no longer choose it. The drive keeps what it holds."
-        self._ask(f"No reference by {code} any more?", follows, "End", "Cancel", confirmed)
+        follows = "Run commands no longer select it. The drive keeps its present values."
+        self._ask(
+            f"Stop setting the reference through {code}?", follows, "End", "Cancel", confirmed
+        )
 
     async def _settle(self, change: Callable[[], str]) -> None:
-        """Make a change that waits for the disk, and report its result."""
+        """Make a change that is stored on disk, and report its result."""
         work = self.session.work
         try:
             work.report(OutcomeKind.DONE, await asyncio.to_thread(change))
@@ -120,7 +122,7 @@ class TeachKeys(ArmingKeys):
 
 
 class PickWord(KeyQuestion[str | None]):
-    """A list of words that are shown raw, or were taught; gives the code of one back."""
+    """A list of values that are shown raw, or have a learned scale; answers with a code."""
 
     BINDINGS: ClassVar = []
 
@@ -131,28 +133,28 @@ class PickWord(KeyQuestion[str | None]):
     def dialog(self) -> ComposeResult:
         """The list and its keys."""
         with Vertical(id="dialog"):
-            yield Plain("Which value shall be taught?", id="question")
+            yield Plain("Learn the scale of which value?", id="question")
             yield from self.now_lines()
             width = min(WIDEST_LIST, self.app.size.width) - AROUND_LIST
             texts = teach_lines(self._drive_console, self._codes, width)
             lines = (entry(text, id=code_id(at)) for at, text in enumerate(texts))
             yield OptionList(*lines, id="choices", compact=True)
-            keys = (("Up, Down", "choose"), ("Enter", "continue"), ("Esc or q", "no"))
-            yield Plain("Others: Parameters (3), L.", id="about")
+            keys = (("Up, Down", "Choose"), ("Enter", "Continue"), ("Esc or q", "Cancel"))
+            yield Plain("For other values, press L on Parameters (3).", id="about")
             yield Plain(hint(*keys), id="hint")
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Take the one under the cursor."""
+        """Answer with the code under the cursor."""
         self.answer(self._codes[event.option_index])
 
 
 def code_id(place: int) -> str:
-    """Return the id of a line of the list; a code may have characters that Textual rejects."""
+    """Return the id of a list entry; a code may contain characters that Textual rejects."""
     return f"word{place}"
 
 
 def teach_lines(console: DriveConsole, codes: Sequence[str], width: int) -> list[Text]:
-    """Return a line for each word: code, name, and the value that it holds now."""
+    """Return a line for each parameter: code, name and present value."""
     profile = console.session.profile
     room = width - BESIDE_WORD
     names = fitted_names(tuple(profile[code].name for code in codes), room)
@@ -168,11 +170,11 @@ def _teach_line(console: DriveConsole, code: str, name: str) -> Text:
         return text.append("not read yet", FAINT)
     value = shown(session.profile, session.profile[code], raw, session.image.raws)
     text.append(f"{value.display if value.taught else f'raw {raw}':>12}", STRONG)
-    return text.append("  taught" if value.taught else "", FAINT)
+    return text.append("  learned" if value.taught else "", FAINT)
 
 
 def words_to_teach(profile: Profile, watched: Sequence[str]) -> list[str]:
-    """Codes that Monitor offers: those it watches, then what may take the reference."""
+    """Codes that Monitor offers: those it shows, then those that can set the reference."""
     can = {*teachable_codes(profile), *profile.taught}
     ways = profile.data.teachable_references
     offered = [*watched, *(code for way in ways for code in (way.parameter, way.most))]
@@ -180,7 +182,7 @@ def words_to_teach(profile: Profile, watched: Sequence[str]) -> list[str]:
 
 
 def fault_of_look(text: str) -> str:
-    """Return the error in a typed reading, or nothing."""
+    """Return the error in a typed reading; empty if it is valid."""
     try:
         parse_display(text)
     except DriveError as error:
@@ -189,14 +191,14 @@ def fault_of_look(text: str) -> str:
 
 
 def _known(console: DriveConsole, code: str) -> str:
-    """Return what is known so far."""
+    """Return the raw value, and what has been learned so far."""
     raw = console.session.image.raws.get(code)
-    now = "" if raw is None else f"It reads raw {raw} now. "
+    now = "" if raw is None else f"Present raw value: {raw}. "
     scale = console.teacher.scales.get(code)
     looks = console.teacher.looks(code)
     if scale is not None:
-        return f"{now}Taught: {scale.text}. A look that disagrees ends it."
+        return f"{now}Learned scale: {scale.text}. A reading that disagrees discards it."
     if looks:
         seen = ", ".join(look.text for look in looks)
-        return f"{now}Seen before: {seen}. Look at another value."
-    return f"{now}Two readings at different values show what a count is."
+        return f"{now}Earlier readings: {seen}. Read at another value."
+    return f"{now}Two readings at different values give the scale."

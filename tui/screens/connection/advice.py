@@ -53,13 +53,13 @@ def _part(text: str, width: int, most: int, style: Style) -> list[Text]:
 HINTS: tuple[tuple[type[Exception], str], ...] = (
     (faults.PortBusy, "Press Enter to try again."),
     (faults.PortMissing, "Plug in the adapter and press Enter, or choose another line."),
-    (faults.PortRefused, "Ask for the right to use the port (group dialout), or choose another."),
+    (faults.PortRefused, "Get permission to use the port (group dialout), or choose another."),
     (faults.LinkSyntaxError, "Press n to type the line again."),
-    (faults.NoAnswer, "Press N to diagnose, s to scan again."),
-    (faults.ChecksumFault, "Press N to diagnose, s to scan again."),
-    (faults.LineLost, "Check cable, gateway and network; press Enter to try again."),
+    (faults.NoAnswer, "Press N to diagnose, or s to scan again."),
+    (faults.ChecksumFault, "Press N to diagnose, or s to scan again."),
+    (faults.LineLost, "Check the cable, gateway and network. Press Enter to try again."),
     (faults.LineError, "Press Enter to try again, or choose another line."),
-    (drive_faults.UnknownProfile, "Clear or correct the profile, then s."),
+    (drive_faults.UnknownProfile, "Clear or correct the profile, then press s."),
     (drive_faults.ProfileError, "Fix the file. `drivepanel profiles --check` lists all errors."),
 )
 

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
     from tui.session.fleet import FoundDrive
 
-WATCHED_ONLY = "It is watched by that profile, and not armed."
+WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
 
 ABOUT, LEFT_LINES = 2, 3
 """Lines of a drive, and lines at most of a motor that no program commands."""
@@ -25,7 +25,7 @@ def profile_text(drive: FoundDrive) -> str:
     if drive.session is None:
         return ""
     if drive.session.contradiction:
-        return f"{drive.session.profile.name}, not its own"
+        return f"{drive.session.profile.name}, which does not match"
     return drive.session.profile.name + (" ?" if drive.guessed else "")
 
 
@@ -43,13 +43,13 @@ def next_step(drive: FoundDrive) -> str:
     """Return the next step for a drive whose profile is unknown or wrong; else nothing."""
     if drive.session is not None and drive.session.contradiction:
         own = drive.identity.profile or "its own"
-        return f"Not armed: the profile is not its own. Type {own} beside Profile, then s."
+        return f"Cannot be armed: wrong profile. Enter {own} as Profile, then press s."
     candidates = drive.identity.candidates
     others = [c for c in candidates if drive.session and c != drive.session.profile.id]
     if drive.session is None:
-        return "It does not say what it is: type its profile beside Profile, then s."
+        return "It does not identify itself. Enter its profile as Profile, then press s."
     if drive.guessed and others:
-        return f"A guess: if it is {' or '.join(others)}, type that beside Profile, then s."
+        return f"Assumed profile. If it is {' or '.join(others)}, enter that, then press s."
     return ""
 
 
@@ -69,7 +69,7 @@ def use_text(line: ModbusLine) -> str:
         several = names.count(program.name) > 1 and program.id != facts.me.id
         parts.append(f"{name}{f' {program.pid}' if several else ''} {share:>3.0%}")
     total = min(1.0, sum(share for _, share in found))
-    return " · ".join((f"In use {total:>4.0%}", *parts))
+    return " · ".join((f"Line use {total:>4.0%}", *parts))
 
 
 def about_lines(
@@ -86,7 +86,7 @@ def about_lines(
     first: list[Text] = []
     if left:
         del lines[1:]
-        text = f"{left} Press Enter: then Space stops it, T takes it over."
+        text = f"{left} Press Enter to open it, then Space to stop it or T to take it over."
         first = [Text(f" {row}", ATTENTION) for row in wrapped(text, width - 2, LEFT_LINES)]
     lines += [Text("")] * (ABOUT - len(lines) - len(first))
     if line is None:

@@ -13,6 +13,8 @@ from tui.widgets.palette import ALARM, FAINT, PLAIN
 ONE_ROW, NARROW = 120, 80
 """Columns from which line and drive have one row, and below which a figure has no word."""
 LINE, DRIVE = " Line 60 s ", " Drive {:<4}"
+NO_REPLIES = "no replies"
+
 _STRANGE = ("foreign", "strays")
 
 
@@ -37,7 +39,12 @@ def health_lines(counted: LineCounters, device: int | None, width: int) -> list[
 
 
 def _good(text: Text, share: float | None, replies: int, words: str) -> None:
-    text.append(f"{percent(share)} %", ALARM if _is_poor(share, replies) else PLAIN)
+    figure = f"{percent(share)} %"
+    cells = len(figure) + len(words)
+    if share is None and len(NO_REPLIES) <= cells:
+        text.append(f"{NO_REPLIES:<{cells}}", FAINT)
+        return
+    text.append(figure, ALARM if _is_poor(share, replies) else PLAIN)
     text.append(words, FAINT)
 
 

@@ -18,6 +18,11 @@ from .choices import LineChoice, fault_of_line, line_forms, same_line
 from .line_form import ADDRESSES
 from .scanning import Scanning
 
+OPEN_WITH_ONE = "{line} is open, with 1 drive found."
+OPEN_WITH_MANY = "{line} is open, with {count} drives found."
+OPEN_WITH_NONE = "{line} is open, with no drive found."
+OPEN_AND_SCANNED = "{line} is open, with a scan in progress."
+
 
 class LineKeys(Scanning):
     """A line that was opened is searched for drives at once."""
@@ -80,7 +85,7 @@ class LineKeys(Scanning):
             return
         asks = here is not None or self.scanning
         always = f"{self._what_is_here()} It is closed, and {text} is opened." if asks else ""
-        question = "Close the line for another?"
+        question = "Close this line and open the other?"
         if await self.app.may_let_go(question, yes="Close", no="Cancel", always=always):
             # drives may have answered while that was asked
             self._open_next(text, device, beside=here is None and bool(self.found))
@@ -95,7 +100,7 @@ class LineKeys(Scanning):
             return
         self.end_search()
         self.app.show_line(here)
-        self.say(f"{here.opened.label} is shown.", "The other lines go on below.")
+        self.say(f"{here.opened.label} is shown.", "The other lines stay open.")
         self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
         self.look()
 
@@ -141,9 +146,11 @@ class LineKeys(Scanning):
 
     def _what_is_here(self) -> str:
         count = len(self.found)
-        search = "a scan in progress" if self.scanning else "no drive found"
-        drives = f"{count} drive{'s' if count > 1 else ''} found" if count else search
-        return f"{self.app.line_label} is open, with {drives}."
+        if count:
+            text = OPEN_WITH_ONE if count == 1 else OPEN_WITH_MANY
+        else:
+            text = OPEN_AND_SCANNED if self.scanning else OPEN_WITH_NONE
+        return text.format(line=self.app.line_label, count=count)
 
     def _tell_open(self) -> None:
         """Enter on the line that is open looks for its drives, unless that goes on."""

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from tui.drive.finding import LineSetting
     from tui.session.connect.scan_estimate import ScanEstimate
 
+DRIVES_ANSWER = "Drives answer at {setting}."
+DAMAGED_ANSWERS = "A device answers at {setting}, but its identification is damaged."
+
 
 class OtherSettings(LineKeys):
     """Tries one setting after the other until a drive answers; the line stays there."""
@@ -38,7 +41,7 @@ class OtherSettings(LineKeys):
         try:
             devices = self.form.addresses()
         except LinkSyntaxError as error:
-            self.say(str(error), "c changes the addresses.", ALARM_KIND)
+            self.say(str(error), "Press c to change the addresses.", ALARM_KIND)
             return
         self.end_search()
         always = self._what_is_here() if self.found else self._who_is_unclear()
@@ -59,7 +62,7 @@ class OtherSettings(LineKeys):
         if not answered:
             return ""
         who = addresses_text(sorted(answered))
-        return f"Something answered at {who}: its reaction when polling stops is not known."
+        return f"A device answered at {who}. Its communication loss reaction is not known."
 
     def _port(self) -> SerialLink | None:
         """The port that is open for the panel alone; else it is said why nothing is tried."""
@@ -75,8 +78,8 @@ class OtherSettings(LineKeys):
             )
         elif others := opened.line.facts.others:
             who = ", ".join(other.text for other in others)
-            next_step = "Other settings need the line for the panel alone."
-            self.say(f"{who} uses the line too.", next_step, ALARM_KIND)
+            next_step = "Close that program to try other settings."
+            self.say(f"{who} also uses the line.", next_step, ALARM_KIND)
         else:
             return link
         return None
@@ -137,7 +140,7 @@ class OtherSettings(LineKeys):
                 self.say(f"The scan ended at {far}.", "")
                 return
             except PortRefused as error:
-                self.app.events.add("told", f"{setting} is not tried: {error}")
+                self.app.events.add("told", f"{setting} was skipped: {error}")
                 continue
             except LineError as error:
                 self.fail(error)
@@ -150,7 +153,7 @@ class OtherSettings(LineKeys):
                 return
         self.say(
             f"No drive answered at any of {len(settings)} settings.",
-            "Check that the drives are on, and the two wires; c changes the addresses.",
+            "Check that the drives are on, and both wires. Press c to change the addresses.",
             ALARM_KIND,
         )
 
@@ -160,12 +163,8 @@ class OtherSettings(LineKeys):
         from tui.session.paths import remember_line
 
         self.form.show_settings(setting.baud, setting.format)
-        answer = (
-            "Drives answer"
-            if self.found.keys() - self.unclear
-            else "A device answers, but not clearly,"
-        )
-        self.say(f"{answer} at {setting}.", "The line stays there.")
+        answer = DRIVES_ANSWER if self.found.keys() - self.unclear else DAMAGED_ANSWERS
+        self.say(answer.format(setting=setting), "The line keeps these settings.")
         remember_line(remembered_text(text))
         self.action_refresh_lines()
         self.look()

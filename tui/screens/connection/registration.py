@@ -15,11 +15,11 @@ REGISTERED = (
         actions=key_rows(
             ("open_chosen", "enter", "open", "Open the line or drive under the cursor."),
             ("scan", "s", "scan", "Scan the addresses for drives; drives already found stay."),
-            ("addresses", "c", "range", "Change the addresses to scan: 1-31, or 1,3,5-7."),
+            ("addresses", "c", "address", "Change the addresses to scan: 1-31, or 1,3,5-7."),
             (
                 "type_line",
                 "n",
-                "line",
+                "new",
                 "Type a line to open: serial, TCP, RTU over TCP, simulated.",
             ),
             ("stop_scan", "escape", "", "Leave the field, then end the scan."),

@@ -22,9 +22,9 @@ TRUSTED_LOOKS = 3
 
 VAIN: Mapping[str, tuple[str, str]] = {
     "silent": ("no answer", "lost"),
-    "refused": ("refuses", "refuses"),
-    "damaged": ("damaged", "damaged"),
-    "swapped": ("swapped", "swapped"),
+    "refused": ("refuses reads", "refuses reads"),
+    "damaged": ("bad replies", "bad replies"),
+    "swapped": ("bytes swapped", "bytes swapped"),
     "not_polled": ("not polled", "not polled"),
 }
 """Words for a look in vain: at first, and once nothing is current any more."""

@@ -22,6 +22,13 @@ if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
     from tui.session.connect.search import Search
 
+NONE_AT_ADDRESS = "No drive answered at address {} (2 attempts)."
+NONE_AT_ADDRESSES = "No drive answered at addresses {} (2 attempts)."
+AFTER_NO_ANSWER = (
+    "Press N to diagnose, c to change the addresses, or s to scan again. Ctrl+P lists a scan at"
+    " other baud rates."
+)
+
 
 class Scanning(LineView):
     """Asks each address; a drive that answers gets its profile and is looked after."""
@@ -138,9 +145,7 @@ class Scanning(LineView):
 
     def tell_search(self) -> None:
         """Show the search until the first drive answers."""
-        self.advise(
-            "Scanning for drives.", "Each appears here as it answers. Press Esc to end the scan."
-        )
+        self.advise("Scanning for drives.", "They appear here. Press Esc to end the scan.")
 
     def sum_up(self, devices: Sequence[int]) -> None:
         """Show the result of a finished search."""
@@ -149,12 +154,8 @@ class Scanning(LineView):
         if not self.found and self.search is not None and self.search.answered:
             return  # that something came, and why it is no drive, was told
         if not self.found:
-            self.say(
-                f"No drive answered at address {addresses_text(devices)} (2 attempts).",
-                "Press N to diagnose, c to change the addresses, s to scan again; Ctrl+P for other"
-                " baud rates.",
-                ALARM_KIND,
-            )
+            text = NONE_AT_ADDRESS if len(devices) == 1 else NONE_AT_ADDRESSES
+            self.say(text.format(addresses_text(devices)), AFTER_NO_ANSWER, ALARM_KIND)
             return
         there = len(self.search.answered) if self.search else len(self.found)
         self.say(f"Scan done: {there} of {len(devices)} addresses answered.", "")
@@ -163,7 +164,8 @@ class Scanning(LineView):
         """Keep a drive that answered, with its profile and state."""
         if result.error:
             self.unclear |= {result.device}
-            self.say(f"{result.error} The address is taken.", "Press s to scan again.", ALARM_KIND)
+            text = f"{result.error} A device has this address."
+            self.say(text, "Press s to scan again.", ALARM_KIND)
         if result.identity is None:
             return
         if not result.error:
@@ -244,7 +246,7 @@ class Scanning(LineView):
             known = ", ".join(listing.id for listing in library.listings())
             self.say(
                 f"Device {device} does not identify itself.",
-                f"Type its profile beside Profile: {known}.",
+                f"Enter its profile as Profile: {known}.",
                 ALARM_KIND,
             )
             self.form.ask_for_profile()

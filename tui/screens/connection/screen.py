@@ -105,7 +105,7 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
         field = self.focused
         asks = field is not None and field.id == "addresses" and self.app.fleet is not None
         searches = asks or self.is_on_open_line()
-        return (("Enter", "scan" if searches else "open"), ("Esc", "to the list"))
+        return (("Enter", "scan" if searches else "open"), ("Esc", "list"))
 
     def point_at(self, device: int) -> None:
         """The cursor on the drive that is open: Enter opens that one again."""

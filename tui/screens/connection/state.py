@@ -67,6 +67,15 @@ QUIET = 1.0
 SEARCH_LABEL = 11
 SEARCH_TEXT = 18
 """Cells that show how far a search is."""
+KEPT_FROM_TRIPPING = (
+    "Kept alive while this line is open: {which}. If polling stops, they trip at the end of their"
+    " communication timeout."
+)
+KEPT_FROM_REACTING = (
+    "Kept alive while this line is open: {which}. If polling stops, they react at the end of their"
+    " communication timeout."
+)
+"""Shown once: drives with their communication timeouts, by address."""
 NOBODY: Mapping[int, WallRow] = MappingProxyType({})
 
 
@@ -268,8 +277,8 @@ class LineView(PanelScreen):
         if event.state is WorkerState.ERROR:
             log.error("%s failed", event.worker.name, exc_info=event.worker.error)
             self.say(
-                f"The panel failed at this: {event.worker.error}",
-                "Try again; drivepanel.log in the state folder has more.",
+                f"Internal error: {event.worker.error}",
+                "Try again. See drivepanel.log in the state folder.",
                 ERROR_KIND,
             )
 
@@ -316,11 +325,9 @@ class LineView(PanelScreen):
         self.warned |= new.keys()
         which = ", ".join(f"{device} ({timeout:g} s)" for device, timeout in sorted(new.items()))
         watches = [self.app.fleet.line_watch.watch(device) for device in new]
-        act = "trip" if all(watch and watch.trips for watch in watches) else "act"
-        text = (
-            f"Kept asking: {which}. Otherwise they {act} at the end of their communication timeout"
-        )
-        self.app.events.add("told", f"{text}; it cannot run out while this line is open.")
+        trip = all(watch and watch.trips for watch in watches)
+        text = KEPT_FROM_TRIPPING if trip else KEPT_FROM_REACTING
+        self.app.events.add("told", text.format(which=which))
 
 
 def _lines_title(width: int) -> list[Text]:

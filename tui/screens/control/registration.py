@@ -23,12 +23,12 @@ def create_control(console: DriveConsole) -> Screen[None]:
 
 
 def no_sources(console: DriveConsole) -> str:
-    """The reason why a drive has no such screen; empty if it has one."""
+    """Return why a drive has no Control screen; empty if it has one."""
     if console.session.profile.data.control_sources:
         return ""
     return (
-        f"Who commands drive {console.device} is set at its keypad; t takes the control,"
-        " g gives it back, where it has a word for that."
+        f"Drive {console.device} sets its control source at the keypad. On Monitor, press t to take"
+        " control or g to return it, if the drive can."
     )
 
 

@@ -1,4 +1,4 @@
-"""Control: who commands the drive today, what another configuration would change."""
+"""Control: the drive's commander, and the writes of another configuration."""
 
 from __future__ import annotations
 
@@ -36,26 +36,26 @@ from .view import change_lines, diagram, left_lines, note_lines, now_lines
 if TYPE_CHECKING:
     from tui.session.fleet import Fleet
 
-HOW_IT_IS_PROVED = (
-    "Polling pauses for longer and longer, around its timeout, until the drive reacts: then it is"
-    " in a fault, which x on Monitor resets. It takes about {seconds:.0f} s."
+HOW_IT_IS_TESTED = (
+    "Polling pauses for longer and longer, up to about the timeout, until the drive reacts. It is"
+    " then in fault: press x on Monitor to reset it. The test takes about {seconds:.0f} s."
 )
-PROOF_ON_THE_RUN = (
-    "THE MOTOR TURNS: it does what is set, and may coast; a hoist falls. A stop is sent when the"
-    " test ends, and at any stop key. "
+WITH_RUNNING_MOTOR = (
+    "THE MOTOR IS RUNNING. It reacts as set, and may coast; a hoist load falls. A stop is sent"
+    " when the test ends, or when you press a stop key. "
 )
-TIMEOUTS_A_PROOF_TAKES = 4.6
-"""Timeouts that a proof takes where the drive reacts as set."""
+TIMEOUTS_PER_TEST = 4.6
+"""Duration of a test in communication timeouts, if the drive reacts as set."""
 
 
-def silence_line(
+def timeout_line(
     session: DriveSession, watch: TimeoutWatch | None, proved: str, width: int
 ) -> Text:
-    """Return the drive's timeout reaction, whether it was tested, and how the drive is reached."""
+    """Return the drive's timeout reaction, the result of its test, and its line settings."""
     rules, link = session.profile.data.communication_fault, session.line.link
     reported = Text("  Timeout       ", FAINT, no_wrap=True)
     if rules is None:
-        reported.append("no communication timeout is known", PLAIN)
+        reported.append("none known", PLAIN)
     elif watch is None:
         reported.append(f"{rules.timeout or 'timeout'} off, or not read yet", ALARM)
     else:
@@ -71,7 +71,7 @@ def silence_line(
 
 
 def warning_lines(session: DriveSession, width: int) -> list[Text]:
-    """Return the family's warnings about loss of communication."""
+    """Return the family's warnings about a communication loss."""
     rules = session.profile.data.communication_fault
     lines = []
     for warning in rules.warnings if rules else ():
@@ -82,7 +82,7 @@ def warning_lines(session: DriveSession, width: int) -> list[Text]:
     return lines
 
 
-def ask_to_prove(
+def ask_to_test(
     ask: Callable[[str, str, str, str, Callable[[int], object]], object],
     session: DriveSession,
     watch: TimeoutWatch | None,
@@ -90,24 +90,24 @@ def ask_to_prove(
     turning: bool,
     work: Callable[..., None],
 ) -> None:
-    """Ask whether it is proved now; a motor that turns is named."""
-    seconds = TIMEOUTS_A_PROOF_TAKES * watch.timeout if watch is not None else 0.0
+    """Ask to start the test; `turning` warns of a running motor."""
+    seconds = TIMEOUTS_PER_TEST * watch.timeout if watch is not None else 0.0
     how = (
-        HOW_IT_IS_PROVED.format(seconds=seconds)
+        HOW_IT_IS_TESTED.format(seconds=seconds)
         if watch is not None
-        else HOW_IT_IS_PROVED.partition(" It takes")[0]
+        else HOW_IT_IS_TESTED.partition(" The test takes")[0]
     )
     ask(
-        f"Prove the communication loss of drive {session.device}?",
-        (PROOF_ON_THE_RUN if turning else "") + how,
+        f"Test how drive {session.device} reacts to a communication loss?",
+        (WITH_RUNNING_MOTOR if turning else "") + how,
         "Test",
         "Cancel",
         partial(work, turning=turning),
     )
 
 
-def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: bool) -> None:
-    """Hand the proof to the drive's queue of work. Raises OrderRefused."""
+def begin_test(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: bool) -> None:
+    """Put the test into the drive's work queue. Raises OrderRefused."""
     session, working = console.session, "Communication loss test: polling is paused."
 
     async def carry_out(permit: Permit) -> str:
@@ -122,19 +122,19 @@ def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: boo
             console.proved = result.short
             text = f"Test: {result.text} {result.changed}".rstrip()
             if turning:
-                # before the stop, which ends this work
+                # now, because the stop ends this work
                 fleet.events.add("done" if result.as_set else "failed", text, session.device)
         finally:
             if turning and permit.stamp == session.work.stops:
                 with suppress(LineClosed):
-                    fleet.stop([session], by="the end of the proof")
+                    fleet.stop([session], by="the end of the test")
         return "" if turning else text
 
     session.work.put(Task(carry_out, owner=console, working=working), stamp)
 
 
 class ControlSourceScreen(OrderKeys):
-    """The configurations of a family; Enter writes the chosen one, armed and at rest only."""
+    """The configurations of a family; Enter writes the chosen one, if armed and at standstill."""
 
     CSS_PATH = "control.tcss"
     BINDINGS: ClassVar = bindings(SOURCES)
@@ -147,17 +147,17 @@ class ControlSourceScreen(OrderKeys):
         self.session = console.session
         self._sources = self.session.profile.data.control_sources
         self._raws: dict[str, int] = {}
-        self._trouble = "reading today's configuration"
+        self._trouble = "reading the configuration"
         self._seen: object = None
 
     def body(self) -> ComposeResult:
-        """The list above, what belongs to the chosen one below."""
+        """Commander and timeout, the list, the details of the chosen configuration."""
         yield Lines(id="now")
         yield OptionList(id="sources", compact=True)
         yield Lines(id="detail")
 
     def on_mount(self) -> None:
-        """Show the list, and read what the drive holds."""
+        """Show the list, and read the present configuration."""
         self._list()
         self.query(OptionList).focus()
         self.run_worker(self._read(), exclusive=True, group="sources")
@@ -177,9 +177,9 @@ class ControlSourceScreen(OrderKeys):
         self.look()
 
     def _list(self) -> None:
-        """The configurations, with a mark at today's."""
+        """List the configurations, with a mark at the active one."""
         if not (found := self.query(OptionList)):
-            return  # the screen was left before it stood
+            return  # the screen was left before it was composed
         today = source_in_force(self.session.profile, self._raws)
         options = found.first()
         at = options.highlighted
@@ -199,18 +199,20 @@ class ControlSourceScreen(OrderKeys):
         return self._sources[self.query_one(OptionList).highlighted or 0]
 
     def on_option_list_option_highlighted(self) -> None:
-        """Another one is looked at."""
+        """Show the details of the configuration under the cursor."""
         self.look()
 
     def draw(self, width: int) -> None:
-        """Show the chosen configuration, and who commands now."""
+        """Draw the commander, the timeout, and the chosen configuration."""
         super().draw(width)
         found = source_changes(self.session.profile, self._chosen, self._raws)
         lines = [rule("Signal path of the selected configuration", width), *diagram(self._chosen)]
         lines.append(rule("Enter writes", width))
         if self._raws:
             lines += change_lines(self.session.profile, found, width)
-        lines += [Text(""), *note_lines(self._chosen, found, width)]
+        notes = note_lines(self._chosen, found, width)
+        room = self.query_one("#detail").size.height
+        lines += [*([Text("")] if len(lines) + len(notes) < room else []), *notes]
         if warnings := warning_lines(self.session, width):
             lines += [Text(""), rule("On a communication loss", width), *warnings]
         self.put("detail", lines)
@@ -224,26 +226,26 @@ class ControlSourceScreen(OrderKeys):
         profile, latest = self.session.profile, self.console.latest
         switches = switch_texts(profile, self._raws)
         lines = now_lines(profile, self._today(), latest, self._trouble, switches, width)
-        silence = silence_line(self.session, self._watch(), self.console.proved, width)
+        silence = timeout_line(self.session, self._watch(), self.console.proved, width)
         fleet = self.app.fleet
         left = fleet.left_behind(self.console) if fleet is not None else ""
         return [lines[1], *left_lines(left, width), silence, *lines[2:]]
 
     def _watch(self) -> TimeoutWatch | None:
-        """The drive's watch over the line, once it was read."""
+        """The drive's communication timeout, once it has been read."""
         fleet = self.app.fleet
         return fleet.line_watch.watch(self.session.device) if fleet is not None else None
 
     def _today(self) -> ControlSource | None:
-        """The configuration in force, as far as it was read."""
+        """The active configuration; None if it is not listed, or was not read."""
         return source_in_force(self.session.profile, self._raws) if self._raws else None
 
     def on_option_list_option_selected(self) -> None:
-        """Enter in the list."""
+        """Write on Enter in the list."""
         self.action_write_chosen()
 
     def action_prove(self) -> None:
-        """Ask, then prove the communication timeout of the drive."""
+        """Ask, then test the drive's reaction to a communication loss."""
         latest = self.console.latest
         if not self._require_armed() or latest is None:
             return
@@ -251,22 +253,22 @@ class ControlSourceScreen(OrderKeys):
         if not turning and watch is not None and (why := hidden_at_rest(watch.reaction)):
             self._refuse(why)
             return
-        ask_to_prove(self._ask, self.session, watch, turning=turning, work=self._prove)
+        ask_to_test(self._ask, self.session, watch, turning=turning, work=self._prove)
 
     def _prove(self, stamp: int, *, turning: bool) -> None:
-        """Prove it behind the work before; on record, and told when it has ended."""
+        """Queue the test; its result is recorded and reported."""
         fleet = self.app.fleet
         if fleet is not None:
-            begin_proof(fleet, self.console, stamp, turning=turning)
+            begin_test(fleet, self.console, stamp, turning=turning)
         self.look()
 
     def action_write_chosen(self) -> None:
-        """Say what follows, and write it."""
+        """Ask, then write the chosen configuration."""
         found = source_changes(self.session.profile, self._chosen, self._raws)
         if not self._raws:
-            self._refuse("How the drive is set up was not read yet.")
+            self._refuse("The configuration has not been read yet.")
         elif not found:
-            self._refuse("Nothing to write: the drive is set up so.")
+            self._refuse("Nothing to write: this configuration is active.")
         elif self._require_armed():
             codes = ", ".join(change.parameter.code for change in found)
             follows = (
@@ -275,5 +277,5 @@ class ControlSourceScreen(OrderKeys):
             )
             work = partial(self.commander.configure, self._chosen)
             name = self._chosen.name
-            self._ask(f"{name}?", follows, "Write", "Cancel", work)
+            self._ask(f"Switch to {name}?", follows, "Write", "Cancel", work)
         self.look()

@@ -1,4 +1,4 @@
-"""Commander of a drive, drawn: sources, switches between them, writes of a change."""
+"""Commander of a drive as lines: sources, switches between them, writes of a change."""
 
 from __future__ import annotations
 
@@ -31,10 +31,9 @@ def now_lines(
     switches: Sequence[str],
     width: int,
 ) -> list[Text]:
-    """Return the present commander by the drive's own words, the configuration, and possible
-    others.
+    """Return three lines: a blank, the present commander with its configuration, and switches.
 
-    Three lines.
+    `switches` are texts about inputs that switch to another commander.
     """
     lines = [Text("")]
     state = latest.state if latest is not None and not latest.error else None
@@ -43,9 +42,9 @@ def now_lines(
     if trouble:
         text.append(f"   {trouble}", ALARM)
     elif today is None:
-        text.append("   the active setting is none of these", ALARM)
+        text.append("   the active configuration is not listed", ALARM)
     else:
-        text.append(f"   set up: {today.name}", FAINT)
+        text.append(f"   configuration {today.name}", FAINT)
     text.truncate(width, overflow="ellipsis")
     reported = (
         "; ".join(switch.partition(":")[0] for switch in switches)
@@ -56,8 +55,8 @@ def now_lines(
 
 
 def left_lines(left: str, width: int) -> list[Text]:
-    """A motor that no program commands, who started it, and what to do; none without one."""
-    text = f"{left} Space stops it; T on Monitor takes it over." if left else ""
+    """Lines about a running motor without a commander; empty if there is none."""
+    text = f"{left} Press Space to stop it, or T on Monitor to take it over." if left else ""
     return [Text(f"  {line}", ATTENTION) for line in wrapped(text, width - 4, LEFT_ROWS)]
 
 
@@ -78,7 +77,7 @@ def _channel(profile: Profile, latest: Snapshot | None) -> str:
 
 
 def diagram(source: ControlSource) -> list[Text]:
-    """Command and reference on their ways to the drive; always four lines."""
+    """The signal paths of command and reference; always four lines."""
     return [*_way(source.command, "command"), *_way(source.reference, "reference")]
 
 
@@ -99,9 +98,9 @@ def _way(way: Way, goal: str) -> list[Text]:
 
 
 def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) -> list[Text]:
-    """Return the pending writes, word by word."""
+    """Return the pending writes, one parameter after another."""
     if not found:
-        return [Text("   Nothing: the drive is set up so.", STRONG)]
+        return [Text("   Nothing: this configuration is active.", STRONG)]
     values = [(_named(profile, c, c.old), _named(profile, c, c.new)) for c in found]
     names = tuple(change.parameter.name for change in found)
     beside = CHANGE_CODE + len(" ") + max(len(f"{old} → {new}") for old, new in values)
@@ -135,10 +134,10 @@ def _named(profile: Profile, change: SourceChange, raw: int | None) -> str:
 
 
 def note_lines(source: ControlSource, found: Sequence[SourceChange], width: int) -> list[Text]:
-    """Return further facts about a configuration."""
+    """Return the note on a configuration, and a warning about unverified parameters."""
     lines = [Text(f"   {line}", FAINT) for line in wrapped(source.note, width - 4, 2)]
     unsure = [change.parameter.code for change in found if not change.verified]
     if unsure:
-        text = f"? No manual in hand confirms the address of {', '.join(unsure)}."
+        text = f"? No available manual confirms the address of {', '.join(unsure)}."
         lines.append(Text(cut(f"   {text}", width).rstrip(), ALARM))
     return lines

@@ -1,1 +1,1 @@
-"""Questions that a screen asks: each a dialog of its own, over the screen that asks it."""
+"""Dialogs: each opens over a screen and returns an answer to it."""

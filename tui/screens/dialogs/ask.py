@@ -22,26 +22,25 @@ if TYPE_CHECKING:
 def fault_of_new(name: str) -> str:
     """Return the error in a name for a new file, or nothing."""
     if not name.strip():
-        return "A name is needed."
+        return "Enter a file name."
     if not name.isprintable():
-        return "A name has no control characters."
+        return "A file name cannot contain control characters."
     try:
         return f"{name} already exists." if Path(name).expanduser().exists() else ""
     except OSError as error:  # too long, or below a folder that may not be looked into
-        return f"No file can be made there: {error.strerror or error}."
+        return f"The file cannot be created: {error.strerror or error}."
     except RuntimeError:
-        return f"There is no home folder of {name.partition('/')[0]}."
+        return f"{name.partition('/')[0]} has no home folder."
 
 
 TextCheck = Callable[[str], str]
-"""Check of a text: its error, or nothing."""
+"""Returns the error in a text, or an empty text."""
 
 
 class Ask(Question[str | None]):
-    """Asks for a text; gives it back once it is right, or None.
+    """Asks for a text; answers with a valid text, or None.
 
-    `takes` says what Enter does with it. A `number` has no spaces in it: Space stops there, as
-    outside of texts.
+    `takes` is the label of Enter. In a `number`, Space stops the motor, as outside text fields.
     """
 
     def __init__(
@@ -51,7 +50,7 @@ class Ask(Question[str | None]):
         *,
         text: str = "",
         about: str = "",
-        takes: str = "accept",
+        takes: str = "OK",
         number: bool = False,
         now: MotorStates | None = None,
     ) -> None:
@@ -64,7 +63,7 @@ class Ask(Question[str | None]):
         self._takes = takes
 
     def dialog(self) -> ComposeResult:
-        """A field, room for what is wrong, and what an answer looks like."""
+        """The question, a field, room for an error, and a description of the answer."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
             yield from self.now_lines()
@@ -74,7 +73,7 @@ class Ask(Question[str | None]):
             yield Plain(hint(("Enter", self._takes), ("Esc", "Cancel")), id="hint")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Give the text back if nothing is wrong with it."""
+        """Answer with the text if it is valid."""
         fault = self._check(event.value)
         if fault:
             self.query_one("#fault", Plain).update(fault)

@@ -1,4 +1,4 @@
-"""A dialog that says what will happen and asks whether it shall."""
+"""A dialog that states what follows, and asks for a yes or a no."""
 
 from __future__ import annotations
 
@@ -19,10 +19,11 @@ if TYPE_CHECKING:
 
 
 class Confirm(KeyQuestion[bool]):
-    """Says what follows; True for `y`, False for Esc, `q` and `n`.
+    """States what follows; answers True for `y`, and False for Esc, `q` and `n`.
 
-    `yes` and `no` say what the keys do. Where it `loses` nothing, because nothing is written,
-    moved or deleted, Enter is yes too. One that comes `by_itself` waits until nobody types.
+    `yes` and `no` are the labels of the keys. If it `loses` nothing, because nothing is written,
+    moved or deleted, Enter means yes, too. A question that opens `by_itself` accepts an answer
+    only after a pause in typing.
     """
 
     NO = False
@@ -50,7 +51,7 @@ class Confirm(KeyQuestion[bool]):
         self._keys = hint(("y" if loses else "y or Enter", yes), ("Esc or q", no))
 
     def dialog(self) -> ComposeResult:
-        """Compose the question, the motor's state, the consequences, and the keys."""
+        """The question, the motor's state, the consequences, and the keys."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
             yield from self.now_lines()
@@ -59,27 +60,27 @@ class Confirm(KeyQuestion[bool]):
             yield Plain(self._keys, id="hint")
 
     def on_mount(self) -> None:
-        """Make a text scroll that is too long for the terminal, and show that it does."""
+        """Name the scroll keys if the text is too long for the terminal."""
         self.call_after_refresh(self._tell_scrolling)
 
     def _tell_scrolling(self) -> None:
-        says = self.query("#says")  # none where a stop has ended the question meanwhile
+        says = self.query("#says")  # none if a stop has ended the question
         if says and says.first().max_scroll_y:
-            self._keys.append("   ").append_text(hint(("Up, Down", "scroll")))
+            self._keys.append("   ").append_text(hint(("Up, Down", "Scroll")))
             self.tell_keys(self._keys)
 
     def tell_follows(self, follows: str) -> None:
-        """Replace the text of what follows, once more is known."""
+        """Replace the consequences, once more is known."""
         if self.is_attached and self.query("#follows"):
             self.query_one("#follows", Plain).update(follows)
             self._fit_list()
 
     def action_yes(self) -> None:
-        """Go on."""
+        """Answer yes."""
         self.answer(True)
 
     def action_enter(self) -> None:
-        """Go on where nothing can be lost; elsewhere say that Enter does nothing."""
+        """Answer yes if nothing can be lost; else show which keys answer."""
         if not self._loses:
             self.answer(True)
             return

@@ -1,4 +1,4 @@
-"""Leaving while a motor runs by a command from here: stop it, or leave it running knowingly."""
+"""The question when the panel quits while a motor runs on its command: stop it, or not."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ LeaveChoice = Literal["stop", "leave", "stay"]
 
 
 class Leave(KeyQuestion[LeaveChoice]):
-    """Confirms what happens to the motors; to stop them is safe, so Enter does that too."""
+    """Asks what happens to the running motors; stopping is safe, so Enter means that, too."""
 
     NO: ClassVar[LeaveChoice] = "stay"
     GUARDED = "enter,l"
@@ -33,21 +33,21 @@ class Leave(KeyQuestion[LeaveChoice]):
         self._follows = follows
 
     def dialog(self) -> ComposeResult:
-        """Compose the running motors, the consequences of leaving, and the keys."""
+        """The running motors, the consequences of quitting, and the keys."""
         with Vertical(id="dialog"):
-            yield Plain("A motor runs by your command", id="question")
+            yield Plain("A motor is running on your command", id="question")
             yield from self.now_lines()
             with VerticalScroll(id="says"):
                 yield Plain(self._follows, id="follows")
             yield Plain(
                 hint(
-                    ("s or Enter", "Stop and leave"),
-                    ("l", "Leave running"),
+                    ("s or Enter", "Stop and quit"),
+                    ("l", "Leave it running and quit"),
                     ("Esc or q", "Stay"),
                 ),
                 id="hint",
             )
 
     def action_choose(self, choice: LeaveChoice) -> None:
-        """Give the choice back."""
+        """Answer with the choice."""
         self.answer(choice)

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 DRIVES_NAMED = 4
-"""Drives that are reported; more are counted."""
+"""Drives that have a line; more are counted."""
 
 
 class MotorStates:
-    """Shows in a line a drive what its motor does, as known at the moment of the call."""
+    """Makes one line per drive with the state of its motor at the time of the call."""
 
     def __init__(self, app: Panel, sessions: Sequence[DriveSession]) -> None:
         self._app, self._sessions = app, list(sessions)
@@ -29,8 +29,8 @@ class MotorStates:
         return frozenset(session.device for session in self._sessions)
 
     def __call__(self) -> Text:
-        """The lines as they are now; where there are several drives, with their addresses."""
-        # here: the app's first picture needs none of what tells the state of a drive
+        """The present lines; with addresses if there are several drives."""
+        # imported here, as the app's first picture does not need it
         from tui.widgets.motor_state_text import motor_state_text
 
         fleet = self._app.fleet

@@ -1,4 +1,4 @@
-"""A list of the files that can be opened here, newest first: no name has to be typed."""
+"""A dialog that lists the files that can be opened, newest first."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ from tui.widgets.plain import Plain, entry
 from .question import KeyQuestion, hint
 
 FILES_LISTED = 200
-"""Files that are listed at most, the newest."""
+"""Files that are listed at most."""
 NAME_WIDTH, DRIVE_WIDTH, ABOUT_WIDTH = 24, 15, 14
-"""Columns of a file; date and time are between name and drive."""
+"""Columns of name, drive and comparison; date and time are between name and drive."""
 SUFFIX = ".toml"
 
 
@@ -38,15 +38,15 @@ class FileAbout:
     reported: str = ""
     """Comparison with the open drive, in two or three words."""
     alarm: bool = False
-    """True if it is of another family, or no file of the kind."""
+    """True if it is of another family, or invalid."""
 
 
 FileReader = Callable[[Path], FileAbout]
-"""Reads a file; called in a thread of its own, as a disk may hang."""
+"""Reads a file; called in a thread, as a disk may hang."""
 
 
 class PickFile(KeyQuestion[str | None]):
-    """Gives the chosen file back, or the name of another choice; opening changes nothing."""
+    """Answers with the chosen file, or the id of another choice; opening changes nothing."""
 
     BINDINGS: ClassVar = [Binding("enter", "pick", show=False)]
 
@@ -57,9 +57,9 @@ class PickFile(KeyQuestion[str | None]):
         folders: Iterable[Path],
         about: FileReader | None = None,
     ) -> None:
-        """`others` are choices beside files: the answer, and how it reads.
+        """`others` are choices besides files: the answer, and its text.
 
-        With `about` each file is read once the list is shown, one after another, the last first.
+        With `about` each file is read after the list is shown, one after another, newest first.
         """
         super().__init__()
         self._question = question
@@ -77,11 +77,11 @@ class PickFile(KeyQuestion[str | None]):
             entries = (entry(line, id=str(at)) for at, line in enumerate(lines))
             yield OptionList(*entries, id="choices", compact=True)
             if not self._found:
-                yield Plain(f"No {SUFFIX} file in this folder, nor where backups are kept.")
+                yield Plain(f"No {SUFFIX} file in this folder or in the backup folder.")
             yield Plain(hint(("Enter", "Open"), ("Esc or q", "Cancel")), id="hint")
 
     def on_mount(self) -> None:
-        """The last file is the one at hand; what the files are is found out meanwhile."""
+        """Select the newest file, and start reading the files."""
         if self._found:
             self.query_one(OptionList).highlighted = len(self._others)
         if self._about is not None:
@@ -94,18 +94,18 @@ class PickFile(KeyQuestion[str | None]):
                 options.replace_option_prompt_at_index(at, file_line(path, reported))
 
     def on_option_list_option_selected(self) -> None:
-        """Enter in the list."""
+        """Answer on Enter in the list."""
         self.action_pick()
 
     def action_pick(self) -> None:
-        """Give the choice back."""
+        """Answer with the selected entry."""
         at = self.query_one(OptionList).highlighted
         if at is not None:
             self.answer(self._answers[at])
 
 
 def files_in(folders: Iterable[Path]) -> list[Path]:
-    """The files of some folders that may be opened, the newest first; none is read."""
+    """The files of these folders with the right ending, newest first; none is read."""
     found: dict[Path, float] = {}
     for folder in folders:
         try:
@@ -118,7 +118,7 @@ def files_in(folders: Iterable[Path]) -> list[Path]:
 
 
 def file_line(path: Path, about: FileAbout) -> Text:
-    """A file with its date and what is known of it."""
+    """A file with its date, its drive and its comparison."""
     text = Text(f" {cut(plain(path.name), NAME_WIDTH)} ", PLAIN, no_wrap=True)
     try:
         when = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))

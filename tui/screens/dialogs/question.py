@@ -1,7 +1,7 @@
-"""Common parts of questions: no answer by accident, and the motor's state.
+"""Common parts of questions: protection from accidental answers, and the motor's state.
 
-Enter and `y` count only once the question has stood on the screen for a moment: a key that was
-typed before it was there was meant for something else.
+Enter and `y` count only after the question has been visible for a moment. A key typed before was
+intended for something else.
 """
 
 from __future__ import annotations
@@ -33,39 +33,39 @@ if TYPE_CHECKING:
 T = TypeVar("T")
 
 DIALOG_STYLES = Path(__file__).with_name("dialogs.tcss")
-"""Absolute, as Textual looks beside the class that inherits it, which may be of another room."""
+"""Absolute, as Textual resolves it from the module of the subclass, which may be elsewhere."""
 
 DIALOG_SHARE, BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 0.83, 2, 4, 2
-"""Of the screen's rows those of a dialog at most; of its border; columns of border and padding;
-rows that a list keeps."""
+"""Share of the screen's rows for a dialog; rows of its border; columns of border and padding; rows
+that a list keeps."""
 
-TYPED_ON = "A question came meanwhile: after a second without a key it takes an answer."
+TYPED_ON = "Key ignored: a question appeared as you typed. Wait a second, then answer."
 
 TOO_EARLY = "Key ignored: it came before this could be read. Press it again."
 
 NOW_EVERY = 0.5
-"""Seconds between two looks at what the motor does."""
+"""Seconds between two refreshes of the motor's state."""
 
 
 class Question(Framed, ModalScreen[T]):
-    """A dialog that gives an answer back; Esc is no, as is a stop of the drive meanwhile."""
+    """A dialog with an answer; Esc means no, and so does a stop of the drive."""
 
     CSS_PATH = DIALOG_STYLES
     SETTLED: ClassVar[float] = 0.3
-    """Seconds that a question has stood before Enter and `y` are answers."""
+    """Seconds that a question must be visible before Enter and `y` are answers."""
     NO: ClassVar[Any] = None
     """The answer that changes nothing."""
     GUARDED: ClassVar[str] = "enter"
-    """Keys that are swallowed until the question has stood for that time."""
+    """Keys that are ignored until then."""
     NO_KEYS: ClassVar[str] = ""
-    """Keys that are no, besides Esc."""
+    """Keys that mean no, besides Esc."""
     by_itself = False
-    """True if it comes while a person may be typing something else: continued typing answers
-    nothing, neither yes nor no."""
+    """True if it opens without a key, while a person may be typing: until a pause, keys are
+    ignored, as yes and as no."""
     BINDINGS: ClassVar = [Binding("escape", "no", show=False)]
 
     def __init_subclass__(cls, **how: Any) -> None:
-        """Guard the keys of each question: Textual lets a class replace those of its base."""
+        """Add the guard to each subclass: in Textual, its bindings replace those of the base."""
         guard = Binding(cls.GUARDED, "swallow", show=False, priority=True)
         own = [guard, *vars(cls).get("BINDINGS", ())]
         if cls.NO_KEYS:
@@ -79,11 +79,11 @@ class Question(Framed, ModalScreen[T]):
         self._now = now
         self._drawn: float | None = None
         self._typed_at = -math.inf
-        """When the last key came."""
+        """When the last key arrived."""
         self._voided = self._answered = False
 
     def compose(self) -> ComposeResult:
-        """The frame, which is live over a question too, and what is asked."""
+        """The frame, which stays live over a question, and the dialog."""
         yield from self.framed()
         yield from self.dialog()
 
@@ -92,24 +92,24 @@ class Question(Framed, ModalScreen[T]):
         raise NotImplementedError
 
     def on_mount(self) -> None:
-        """From its first picture on it is asked."""
+        """Start the guard time with the first picture, and the refresh of the motor's state."""
         self._fit_list()
-        self.call_after_refresh(self._stands)
+        self.call_after_refresh(self._note_drawn)
         if self._now is not None:
             self.set_interval(NOW_EVERY, self._tell_now)
 
     def on_screen_resume(self, event: ScreenResume) -> None:
-        """A question that was voided below another screen ends now."""
+        """End a question that was canceled while another screen was on top."""
         if self._voided:
             self.call_later(self.void)
 
     def on_resize(self, event: Resize) -> None:
-        """More room, or less."""
+        """Fit the list to the new size."""
         if not self.is_too_small:
             self._fit_list()
 
     def _fit_list(self) -> None:
-        """Give a list, or what can be scrolled, the rows that the rest of the dialog leaves."""
+        """Give the list, or the scrolled part, the rows that the rest of the dialog leaves."""
         for part in self.query("#choices, #says"):
             if (box := part.parent) is None or not isinstance(box, Widget):
                 continue
@@ -121,7 +121,7 @@ class Question(Framed, ModalScreen[T]):
             part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)
 
     def _rows(self, part: Widget, width: int) -> int:
-        """Rows of a part of the dialog, with what is above and below it."""
+        """Rows of a part of the dialog, with its margins."""
         high = part.styles.height
         fixed = int(high.value) if high is not None and high.is_cells else None
         size = self.size
@@ -129,7 +129,7 @@ class Question(Framed, ModalScreen[T]):
         return rows + part.styles.margin.height
 
     def tell_keys(self, keys: Text) -> None:
-        """Show the keys again; they may take more rows than before."""
+        """Replace the line of keys, which may need more rows now."""
         self.query_one("#hint", Plain).update(keys)
         self._fit_list()
 
@@ -139,46 +139,48 @@ class Question(Framed, ModalScreen[T]):
             yield Plain(self._now(), id="now")
 
     def concerns(self, device: int) -> bool:
-        """Return True if a stop of this drive voids the question."""
+        """Return True if a stop of this drive cancels the question."""
         return self._now is not None and device in self._now.devices
 
     def void(self) -> None:
-        """End with the answer that changes nothing; belongs to the loop of the screen."""
+        """Cancel: end with the answer that changes nothing. Call it in the app's loop."""
         self._voided = True
         if self.is_active:
             self.answer(self.NO)
 
     @property
     def is_answered(self) -> bool:
-        """True from the key that answers on, before the answer has reached the one who asked."""
+        """True from the answering key on, even before the answer has been delivered."""
         return self._answered
 
     def answer(self, value: T) -> None:
-        """Give the answer back, once; a voided question has but one."""
+        """Close with an answer, once; a canceled question always answers no."""
         if not self._answered:
             self._answered = True
             self.dismiss(self.NO if self._voided else value)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """A key that comes too early is swallowed; later the binding does not count."""
+        """Enable the guard while keys come too early."""
         if action == "swallow":
             return self._is_early() and (self.by_itself or not parameters)
         return super().check_action(action, parameters)
 
     def on_key(self, event: Key) -> None:
-        """Note when the last key came."""
+        """Note when the last key arrived."""
         self._typed_at = self.app.clock.monotonic()
 
     def action_swallow(self, as_no: bool = False) -> None:
-        """Ignore a key and report why. A no waits only if no key asked the question."""
+        """Ignore a key that came too early, and report why.
+
+        A no is ignored only if the question opened without a key."""
         self._typed_at = self.app.clock.monotonic()
         self.app.tell(TYPED_ON if self.by_itself else TOO_EARLY)
 
     def action_no(self) -> None:
-        """Change nothing."""
+        """Answer no."""
         self.answer(self.NO)
 
-    def _stands(self) -> None:
+    def _note_drawn(self) -> None:
         self._drawn = self.app.clock.monotonic()
 
     def _is_early(self) -> bool:
@@ -197,14 +199,14 @@ class Question(Framed, ModalScreen[T]):
 
 
 class KeyQuestion(Question[T]):
-    """A question answered by keys alone: no text is typed, so `q` and `n` mean no too."""
+    """A question answered by keys: as no text is typed, `q` and `n` mean no, too."""
 
     GUARDED = "enter,y"
     NO_KEYS = "q,n"
 
 
 def hint(*keys: tuple[str, str]) -> Text:
-    """The line of keys of a dialog: each key and what it does."""
+    """The line of keys of a dialog: each key with its label."""
     text = Text()
     for key, does in keys:
         text.append("   " if text else "")
@@ -213,8 +215,19 @@ def hint(*keys: tuple[str, str]) -> Text:
     return text
 
 
+def matches_text(count: int, shown: int | None = None) -> str:
+    """Return the number of matches of a search; `shown` is how many the list can show."""
+    if not count:
+        return "No match. Delete some letters."
+    if count == 1:
+        return "1 match"
+    if shown is not None and count > shown:
+        return f"{count} matches, first {shown} shown"
+    return f"{count} matches"
+
+
 def void_questions(app: Panel, device: int) -> None:
-    """End every open question about a drive that was stopped; belongs to the screen's loop."""
+    """Cancel every open question about a drive that was stopped. Call it in the app's loop."""
     for screen in reversed(app.screen_stack):
         if isinstance(screen, Question) and screen.concerns(device):
             screen.void()

@@ -1,4 +1,4 @@
-"""Which drive on which line is meant by the question why it does not answer."""
+"""The drive to diagnose, and its line."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class WhyTarget(NamedTuple):
     """The line as it was typed."""
     device: int
     opened: OpenLine | None = None
-    """The line; None where it is not open."""
+    """The line; None if it is not open."""
     profile: str = ""
-    """The profile of the drive as far as it is known here."""
+    """The drive's profile, if known."""
     neighbors: tuple[int, ...] = ()
     """Other drives of the line that answer."""
     trouble: LineError | None = None

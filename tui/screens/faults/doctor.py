@@ -38,7 +38,7 @@ TRUST_WIDTH = 11
 RESET_LINES = 8
 """Lines of how a fault ends at most, at 60 columns."""
 CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
-OPENS = "Enter opens "
+OPENS = "Enter open "
 TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
 """Certainty of the first cause in a word; `practice` is general practice."""
 TRIP_QUANTITIES: Mapping[Quantity, str] = {
@@ -112,7 +112,7 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
             more = len(view.alarms) - 1
             text.append(f"   and {more} more" if more else "", PLAIN)
         else:
-            text.append("No fault now.", STRONG)
+            text.append("No fault.", STRONG)
             text.append("   reading the history" if view.unread and view.history else "", FAINT)
         return [text]
     if view.present:
@@ -120,7 +120,7 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
     else:
         text.append(f"{fault.code}  {fault.name}", FAULT)
     room = width - text.cell_len - 4
-    reported = _tripped(view) if view.present or view.record else "not in it now"
+    reported = _tripped(view) if view.present or view.record else "no longer present"
     text.append(f"   {cut_at_word(reported, max(1, room))}", PLAIN)
     return [text]
 
@@ -133,9 +133,9 @@ def _tripped(view: DoctorView) -> str:
     elif record is not None:
         when = f"tripped {time.strftime('%H:%M:%S', time.localtime(record.wall))}"
     else:
-        return "tripped before it was watched"
+        return "tripped before monitoring began"
     if record is None:
-        return when if view.since and view.since.tripped else f"{when}, tripped before"
+        return when if view.since and view.since.tripped else f"{when}, tripped earlier"
     before = [moment for moment in record.moments if moment.wall < record.wall]
     texts = before[-1].texts if before else ()  # at the trip itself the motor is free already
     values = dict(zip(record.codes, texts, strict=False))
@@ -179,7 +179,7 @@ def _probable(view: DoctorView, width: int) -> list[Text]:
         return []
     if help_ is None:
         cause = fault.cause if fault else ""
-        cause = cause or view.profile.guide.trouble or "The manual in hand gives no cause."
+        cause = cause or view.profile.guide.trouble or "The available manual gives no cause."
         return _labelled("Probably", [Text(part, PLAIN) for part in wrapped(cause, room, 3)])
     left = view.advice
     assert left is not None
@@ -210,7 +210,7 @@ def _look_at(view: DoctorView, width: int) -> list[Text]:
         if chosen:
             text.stylize(CURSOR)
         lines.append(text)
-    return _labelled("Look at", lines)
+    return _labelled("Values", lines)
 
 
 def _value_cells(view: DoctorView, width: int) -> int:

@@ -37,7 +37,7 @@ REGISTERED = (
                 (
                     "other_page",
                     "tab",
-                    "trip",
+                    "record",
                     "Switch between the fault and the seconds before the trip.",
                 ),
                 ("move_record(1)", "left", "", "Show older values of the record."),

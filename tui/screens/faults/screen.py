@@ -104,7 +104,7 @@ class FaultsScreen(OrderKeys):
             found = await self.console.read(list(dict.fromkeys(codes)))
         except LineError as error:
             if self._unread:
-                self.app.notify(f"The history was not read: {error}", severity="warning")
+                self.app.notify(f"The history could not be read: {error}", severity="warning")
         else:
             self._readings = {**self._readings, **found}
             self._unread = False
@@ -207,7 +207,7 @@ class FaultsScreen(OrderKeys):
         reading = self._readings.get(code)
         known = self.session.profile.fault(reading.raw or 0) if reading else None
         if known is None or known.raw == self.session.profile.data.faults.none:
-            self.app.tell("There is no fault to look at.")
+            self.app.tell("No fault is recorded here.")
             return
         self._chosen, self._at = known, 0
         self._read_again()
@@ -238,7 +238,7 @@ class FaultsScreen(OrderKeys):
 
         record = self._recorder.latest
         if record is None:
-            self.app.tell("Nothing to save: no trip was seen since this drive is watched.")
+            self.app.tell("Nothing to save: no trip since monitoring of this drive began.")
             return
         proposed = str(state_folder() / record_name(self.session, record))
 
@@ -246,7 +246,7 @@ class FaultsScreen(OrderKeys):
             if name:
                 self._write(Path(name).expanduser(), record)
 
-        about = "Markdown, with the values, what the drive stored, and what was written."
+        about = "Markdown, with the values, the drive's stored values, and all writes."
         requested = Ask("Save the trip as", fault_of_new, text=proposed, about=about, takes="Save")
         self.app.push_screen(requested, reported)
 

@@ -25,7 +25,7 @@ def stored_lines(
 ) -> list[Text]:
     """Return the values that the drive stored at the moment of a fault."""
     if not codes:
-        return [Text(" The drive stores nothing of this fault.", FAINT)]
+        return [Text(" The drive stores nothing about this fault.", FAINT)]
     known = [profile[code] for code in codes if profile.get(code) is not None]
     values = [stored_text(readings.get(parameter.code)) for parameter in known]
     longest = max(map(len, values), default=0)
@@ -72,7 +72,7 @@ def record_lines(record: FaultRecord | None, width: int, height: int, offset: in
     if record is None:
         return [
             rule("Before the trip", width),
-            Text(" No trip was seen since this drive is watched.", FAINT),
+            Text(" No trip since monitoring of this drive began.", FAINT),
         ]
     title = (
         f"Before the trip: {len(record.moments)} cycles, {len(record.writes)} writes by Drive Panel"

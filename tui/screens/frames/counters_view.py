@@ -9,7 +9,7 @@ from rich.text import Text
 
 from tui.session.counters.compare import Comparison, TurnaroundBar, bars
 from tui.session.counters.watch import CountersNow
-from tui.widgets.drawing import cut_at_word, rule, short, wrapped
+from tui.widgets.drawing import cut_at_word, rule, short, whole_sentences, wrapped
 from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNING, STRONG
 
 EIGHTHS = " ▁▂▃▄▅▆▇█"
@@ -21,7 +21,7 @@ TALL, TALL_BARS, LOW_BARS = 30, 6, 1
 """Rows from which on the bars are tall; the rows of both."""
 LOAD_CELLS = 20
 MOST_LINES_OF_ONE = 4
-RESET_KEYS = "C restart counts, Z reset drive's"
+RESET_KEYS = "C restart counts, Z reset drive's counters"
 BAD = frozenset({"never-arrived", "not-answered", "damaged-there", "damaged-here", "no-answer"})
 """Differences that are frames lost."""
 
@@ -154,8 +154,9 @@ def message(found: CountersNow, width: int, room: int) -> list[Text]:
     worst = sorted(found.differences, key=lambda item: item.kind not in BAD)
     parts = [wrapped(difference.text, width - 5, MOST_LINES_OF_ONE) for difference in worst]
     if sum(map(len, parts)) > room:
-        # what differs of all goes before what to look at of the first
-        parts = [[cut_at_word(difference.text, width - 5)] for difference in worst]
+        # the first sentence of each comes before what to check for the worst
+        texts = [whole_sentences(difference.text, width - 5) for difference in worst]
+        parts = [[cut_at_word(text, width - 5)] for text in texts]
     lines: list[Text] = []
     for difference, reported in zip(worst, parts, strict=True):
         sign = FAULT if difference.kind in BAD else ALARM

@@ -87,8 +87,9 @@ def _request(pdu: Pdu, words: _Words) -> str:
 
 def _reply(pdu: Pdu, requested: DecodedRequest | None, words: _Words) -> str:
     if pdu.function & EXCEPTION_BIT:
-        name = FUNCTION_NAMES.get(pdu.function & ~EXCEPTION_BIT, "")
-        return f"{pdu.device} refuses to {name or 'do it'}: exception {pdu.body[0]}"
+        function = pdu.function & ~EXCEPTION_BIT
+        name = FUNCTION_NAMES.get(function, f"function {function}")
+        return f"{pdu.device} refuses {name}: exception {pdu.body[0]}"
     if pdu.function in (READ, READ_INPUT, READ_WRITE):
         raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
         if requested is None or (requested.device, requested.function) != (

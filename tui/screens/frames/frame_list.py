@@ -28,8 +28,8 @@ Page = Literal["words", "bytes", "sum"]
 PAGES: tuple[Page, ...] = ("words", "bytes", "sum")
 FEW = 6
 """Frames that are shown on a slow link while they come."""
-FILTER_HINT = "drive, function, error, or what it says: 2 read error"
-FIND_HINT = "Enter: the one before; drive, function, error, or what it says"
+FILTER_HINT = "drive, function, error or text, for example 2 read error"
+FIND_HINT = "drive, function, error or text; Enter finds the next older frame"
 
 
 class KeptLine(Protocol):
@@ -113,18 +113,18 @@ class FrameListScreen(PanelScreen):
         room, columns, few = self._room, width, ""
         if self.app.low_bandwidth and self._held is None:
             # all of them anew each time is more than a slow link carries
-            room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h show all, "
+            room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h for all, "
         places = self._places(frames)
         self._up = min(self._up, max(0, len(places) - room))
         end = len(places) - self._up
         count = f"{len(places)} of {len(frames)}" if self._filter else f"{len(frames)}"
-        lines = [rule(self._title(), width, f"{few}{count} frames, j find")]
+        lines = [rule(self._title(), width, f"{few}{count} frames, j to find")]
         shown = places[max(0, end - room) : end]
         self.put("frames", lines + self._lines(frames, shown, columns))
 
     def _title(self) -> str:
-        held = " (held)" if self._held is not None else ""
-        only = f", only {self._filter}" if self._filter else ""
+        held = " (paused)" if self._held is not None else ""
+        only = f", filter: {self._filter}" if self._filter else ""
         return f"{self._heading}{only}{held}"
 
     @property
@@ -220,8 +220,8 @@ class FrameListScreen(PanelScreen):
     def typing_keys(self) -> Sequence[tuple[str, str]]:
         """Those of the filter, or of what is looked for."""
         if self._asking == "find":
-            return ("Enter", "older one"), JOINS_KEY, ("Esc", "end")
-        return ("Enter", "keep"), JOINS_KEY, ("Esc", "all frames")
+            return ("Enter", "next older"), JOINS_KEY, ("Esc", "end")
+        return ("Enter", "keep filter"), JOINS_KEY, ("Esc", "clear")
 
     def _end_asking(self) -> None:
         self._asking = ""
@@ -258,7 +258,7 @@ class FrameListScreen(PanelScreen):
         before = next((at for at, frame in enumerate(shown) if frame is self._found), len(shown))
         older = [at for at in fits if at < before]
         if not older:
-            self.app.tell("No older frame fits." if self._found else "No frame fits.")
+            self.app.tell("No older frame matches." if self._found else "No frame matches.")
             self._found = None
             self.look()
             return

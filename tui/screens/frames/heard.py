@@ -87,7 +87,7 @@ class ListeningScreen(FrameListScreen):
         """Say once that the line is gone."""
         if self._heard.trouble and not self._trouble_shown:
             self._trouble_shown, self._heading = True, "Listening has ended"
-            self.app.notify(f"{self._heard.trouble} Esc leaves.", severity="error")
+            self.app.notify(f"{self._heard.trouble} Press Esc to leave.", severity="error")
         super().draw(width)
 
     def _go_out(self) -> None:
@@ -96,7 +96,9 @@ class ListeningScreen(FrameListScreen):
 
     async def _end(self) -> None:
         await asyncio.to_thread(self._heard.close)
-        self.app.say_first("Listening has ended.", "Enter opens the line; H listens again.")
+        self.app.say_first(
+            "Listening has ended.", "Press Enter to open the line, H to listen again."
+        )
         super()._go_out()
 
     async def on_unmount(self) -> None:

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
 RAW_NAME, TEXT_NAME = ".raw.pcapng", ".txt"
 """Endings of file names: frames as on the line, and text."""
 SAVED_AS = (
-    "pcapng as Modbus/TCP, which tshark decodes at once; a name with .raw.pcapng as RTU with its"
-    " checksums, one with .txt as text, a line a frame with tabs between."
+    "The ending sets the form. .pcapng: Modbus/TCP, for tshark. .raw.pcapng: RTU with checksums."
+    " .txt: text, one line per frame."
 )
 
 

@@ -25,8 +25,8 @@ from .frame_list import FrameListScreen
 COUNTERS_EVERY, COUNTERS_SELDOM = 3.0, 10.0
 """Seconds between two looks at the drive's own counters, and on a slow link."""
 RESETS_NOTHING_ELSE = (
-    "Function 8, sub-function 0A: by the manual it sets the counters of the drive's exchanges to 0"
-    " and nothing else. The motor continues unchanged. Other programs that compare them restart."
+    "Function 8, sub-function 0A: the manual says that it only sets the drive's frame counters to"
+    " 0. The motor continues unchanged. Other programs restart their comparison."
 )
 
 
@@ -74,7 +74,7 @@ class CounterKeys(PanelScreen):
         """Count from now on; only what this panel shows."""
         if self._require_shown():
             self.console.counters.reset_ours()
-            self.app.tell("Counted from now on. What was counted since the line was opened stays.")
+            self.app.tell("Counts restarted. The counts since the line was opened are kept.")
             self.look()
 
     def action_reset_drive_counters(self) -> None:
@@ -118,11 +118,11 @@ class CounterKeys(PanelScreen):
             await self.console.counters.reset_drive(self.console.journal)
         except LineError as error:
             raise OrderRefused(f"Counters not reset: {error}") from error
-        return "The drive's counters are reset."
+        return "The drive's counters were reset."
 
     def _require_shown(self) -> bool:
         if not self.shows_counters:
-            self.app.tell("Tab shows the counters first.")
+            self.app.tell("Press Tab to show the counters first.")
         return self.shows_counters
 
 

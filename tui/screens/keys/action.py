@@ -16,9 +16,9 @@ CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
 BLOCKS, MESSAGES, WIRING = "scanner", "messages", "wiring"
 OPENING = "opening"
-"""Monitor while its drive is not known yet."""
+"""Monitor before its drive is known."""
 LISTENING = "listening"
-"""Frames of others, on a line on which nothing is sent."""
+"""The mode of Frames for a monitored line, on which nothing is sent."""
 
 KEY_NAMES = {
     "escape": "Esc",
@@ -30,7 +30,7 @@ KEY_NAMES = {
     "pageup": "PgUp",
     "pagedown": "PgDn",
 }
-"""Keys that a person reads otherwise than Textual writes them, capitals aside."""
+"""Keys whose names on screens differ from Textual's, apart from capitals."""
 
 
 SHOWING = frozenset(
@@ -47,14 +47,14 @@ SHOWING = frozenset(
 
 
 class Action(NamedTuple):
-    """One thing a person can do."""
+    """One function of the panel."""
 
     id: str
     """Name of the method, with its arguments as Textual writes them."""
     keys: str
     """Keys as Textual names them, separated by commas."""
     label: str
-    """One or two words for the line of keys; none if it is not in the line."""
+    """One or two words for the key bar; empty if it is not in the key bar."""
     help: str
     """A sentence for the help screen and the palette."""
     screens: tuple[str, ...] = ()
@@ -62,9 +62,9 @@ class Action(NamedTuple):
     app: bool = False
     """True for an action of the app, False for one of the screen."""
     first: bool = False
-    """True if the key counts before any widget that has the focus."""
+    """True if the key takes precedence over the focused widget."""
     bound: bool = True
-    """False where the widget that has the focus takes the key."""
+    """False if the focused widget handles the key."""
 
     @property
     def only_shows(self) -> bool:
@@ -73,17 +73,17 @@ class Action(NamedTuple):
 
     @property
     def shown(self) -> str:
-        """The first of its keys, as a person reads it."""
+        """The first of its keys, as screens show it."""
         key = self.keys.partition(",")[0]
         return KEY_NAMES.get(key, key.capitalize() if len(key) > 1 else key)
 
 
 ActionRow = tuple[str, str, str, str]
-"""An action as its table writes it: id, keys, label, help."""
+"""A row of an action table: id, keys, label, help."""
 
 
 def key_rows(*actions: ActionRow) -> tuple[Action, ...]:
-    """The actions of a screen in the order of their rows."""
+    """Make the actions of a screen, in the order of their rows."""
     return tuple(Action(*row) for row in actions)
 
 
@@ -92,30 +92,30 @@ ARMING = key_rows(
     ("disarm", "A", "", "Disarm this drive."),
     ("answer_request", "G", "", "Answer a program that requests this drive. Asks first."),
 )
-"""Actions of every screen that writes to the drive: its class is derived from `ArmingKeys`."""
+"""Actions of every screen that writes to the drive; its class derives from `ArmingKeys`."""
 RESET_HELP = f"Reset the fault. Needs arming; asks first. {MAY_START}"
 RESET_FAULT = Action("reset", "x", "reset", RESET_HELP)
 TEACH = Action("teach", "L", "", "Learn the scale of a raw value from the drive's display.")
 
 
 class Registration(NamedTuple):
-    """One screen: lists, tabs, keys, help, palette and pages of the docs are made from it.
+    """One screen: tabs, keys, help, palette and pages of the docs are made from it.
 
-    Its module imports no screen: the panel starts before most screens are needed.
+    Its module does not import the screen, as the panel starts before most screens are needed.
     """
 
     title: str
-    """Its name on the panel. In lowercase it is the name in the code and of the page."""
+    """Its name on the panel. In lowercase it is its name in the code and of its docs page."""
     actions: tuple[Action, ...]
-    """Its own actions: in this order they are in the key bar and in the help."""
+    """Its own actions, in the order of the key bar and of the help."""
     about: str = ""
     """Its content in a few words, for docs/screens; empty for a screen that has no page."""
     digit: str = ""
-    """The key that opens it from everywhere; it then has a tab, and `create`."""
+    """The key that opens it from every screen; it then has a tab, and `create`."""
     key: str = ""
-    """The key of the panel that opens it, if it has no digit."""
+    """The key that opens it, if it has no digit."""
     narrow: str = ""
-    """Its name in a tab of a narrow terminal."""
+    """Its name in the tabs of a narrow terminal."""
     create: Callable[[DriveConsole], Screen[None]] | None = None
     """Creates the screen on a drive; imports it when called."""
     refusal: Callable[[DriveConsole], str] = lambda console: ""
@@ -123,5 +123,5 @@ class Registration(NamedTuple):
 
     @property
     def name(self) -> str:
-        """The name of the screen in the code."""
+        """Its name in the code."""
         return self.title.lower()

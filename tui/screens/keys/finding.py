@@ -1,4 +1,4 @@
-"""Finding actions by words, those of every screen: what the palette lists, best first."""
+"""Finding actions of all screens by words: what the palette lists, best first."""
 
 from __future__ import annotations
 
@@ -26,43 +26,43 @@ BY_NAME = {
 }
 """Actions on a motor: listed for one of these words, and selected for all of them only."""
 NOT_FOUND = ("command_palette", "stop_by_space", "step_reference(")
-"""The palette itself, a key that has another one to the same end, and steps of a live motor."""
-WAYS = ("leave", "goto(", "move", "scroll(", "page", "end(", "group(")
-"""Beginnings of the ids of what only moves: found where one is, not on other screens."""
+"""Not listed: the palette itself, a key with the same effect as another, and steps of a motor."""
+MOVES = ("leave", "goto(", "move", "scroll(", "page", "end(", "group(")
+"""Beginnings of the ids of actions that only move: found on their own screen only."""
 
 _WORD = re.compile(r"[^\W_]+")
 
 
 @dataclass(frozen=True, slots=True)
 class FoundAction:
-    """An action that fits what was typed."""
+    """An action that matches the typed words."""
 
     action: Action
     screen: str
-    """Screen of the action; the source's screen for an action of the app."""
+    """Screen of the action; the present screen for an action of the app."""
     here: bool
-    """True if it can be done from where one is."""
+    """True if it works on the present screen."""
     score: int
     ready: bool
-    """True if Enter may do it at once: each word that was typed begins a word of it."""
+    """True if it may be selected for Enter: each typed word begins a word of it."""
 
     @property
     def name(self) -> str:
-        """Effect of the action, as a sentence without its point."""
+        """The help of the action without its final full stop."""
         return self.action.help.removesuffix(".")
 
 
 def find(query: str, screen: str) -> list[FoundAction]:
-    """The actions in which every word of the query occurs, best first; those of `screen` are here.
+    """The actions in which every word of the query occurs, best first; `screen` is the present one.
 
-    Without a query what can be done here is listed, in the order of the screen's registration.
+    An empty query lists the actions of this screen, in the order of its registration.
     """
     words = query.split()
     found: dict[tuple[str, str], FoundAction] = {}
     others = (action for action in ACTIONS if screen not in action.screens)
     for action in (*screen_actions(screen), *others):
         here = not action.screens or screen in action.screens
-        if _is_left_out(action, words, here=here):
+        if _is_skipped(action, words, here=here):
             continue
         marks = [_mark(action, screen, word, here=here) for word in words]
         if all(marks):
@@ -74,22 +74,22 @@ def find(query: str, screen: str) -> list[FoundAction]:
     return sorted(found.values(), key=lambda item: (-item.score, not item.here))
 
 
-def _is_left_out(action: Action, words: Sequence[str], *, here: bool) -> bool:
-    if action.id.startswith(NOT_FOUND) or (not here and (not words or action.id.startswith(WAYS))):
+def _is_skipped(action: Action, words: Sequence[str], *, here: bool) -> bool:
+    if action.id.startswith(NOT_FOUND) or (not here and (not words or action.id.startswith(MOVES))):
         return True
     names = BY_NAME.get(action.id, ())
     return bool(names) and not any(word.casefold().startswith(names) for word in words)
 
 
 def _all_named(action: Action, words: Sequence[str]) -> bool:
-    """Return True if each of the names that an action must be called by was typed."""
+    """Return True if all words that an action requires were typed."""
     typed = [word.casefold() for word in words]
     return all(any(word.startswith(n) for word in typed) for n in BY_NAME.get(action.id, ()))
 
 
 def _mark(action: Action, screen: str, word: str, *, here: bool) -> int:
-    """Return how well a word fits an action: 0 not at all, 1 inside a word, more at its
-    beginning."""
+    """Return how well a word matches an action: 0 not at all, 1 inside a word, more at the
+    beginning of one."""
     if here and word in (action.shown, *action.keys.split(",")):
         return 6
     typed = word.casefold()

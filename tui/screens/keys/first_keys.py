@@ -1,4 +1,4 @@
-"""The first start on a terminal: whether its F12 arrives, tried while no line is open."""
+"""The F12 test at the first start on a terminal, while no line is open."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def was_tried() -> bool:
 
 
 def remember() -> None:
-    """F12 arrived; a folder that cannot be written is not an error."""
+    """Store that F12 arrives on this kind of terminal; ignore a folder that cannot be written."""
     tried = stored_json(_file())
     known = [*(tried if isinstance(tried, list) else []), terminal_name()]
     with suppress(OSError):
@@ -33,11 +33,11 @@ def remember() -> None:
 
 
 def unknown_text(data: bytes) -> str:
-    """Return the message about a sequence that no known terminal sends."""
+    """Return the message for a sequence that no known terminal sends."""
     shown = "".join("ESC " if byte == 0x1B else chr(byte) for byte in data if byte < 0x7F)
     return (
-        f"A key arrived that the panel does not know ({shown.strip()}). If it was F12, it does"
-        " nothing on this terminal: stop with Space, or set the terminal to send xterm's keys."
+        f"An unknown key arrived ({shown.strip()}). If it was F12, F12 does nothing on this"
+        " terminal. Stop with Space, or set the terminal to send xterm keys."
     )
 
 

@@ -1,4 +1,4 @@
-"""Help: every key of the screen below, and what the signs mean."""
+"""Help: every key of the screen below, and the meaning of the signs."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
     ("R", "amber", "a setting that takes effect after a reset of the drive"),
 )
 HELP_WIDTH, BESIDE_HELP = 76, 6
-"""Columns of the list at most, and those of its border, its margin and its scroll bar."""
+"""Columns of the dialog at most, and columns of its border, margin and scroll bar."""
 SENTENCE_LINES = 6
 WITHOUT_KEY = "^p"
-"""Place of an action without a key of its own: the list of all."""
+"""The key shown for an action without a key of its own: that of the palette."""
 HELP_STYLES = {
     "cyan": ATTENTION,
     "green": RUNNING,
@@ -52,7 +52,7 @@ HELP_STYLES = {
 
 
 class HelpScreen(Framed, ModalScreen[None]):
-    """The keys of one screen, made from the table of actions."""
+    """The keys of one screen."""
 
     CSS_PATH = "help.tcss"
     BINDINGS: ClassVar = [
@@ -69,7 +69,7 @@ class HelpScreen(Framed, ModalScreen[None]):
         yield from self.dialog()
 
     def dialog(self) -> ComposeResult:
-        """Lines that scroll where the terminal is small."""
+        """Lines that scroll if the terminal is small."""
         keys = Lines()
         keys.show(help_lines(self._of, min(HELP_WIDTH, self.app.size.width) - BESIDE_HELP))
         with VerticalScroll(id="help"):
@@ -77,13 +77,13 @@ class HelpScreen(Framed, ModalScreen[None]):
 
 
 def help_lines(screen: str, width: int) -> list[Text]:
-    """Keys and signs of a screen, each sentence in a column of its own."""
+    """Keys and signs of a screen, with their explanations in a second column."""
     keys = [(action.shown or WITHOUT_KEY, KEY, action.help) for action in screen_actions(screen)]
     signs = [(sign, HELP_STYLES[color], meaning) for sign, color, meaning in SIGNS]
     column = max(len(key) for key, _, _ in (*keys, *signs)) + 2
     title = Text(" " * column).append(f"Keys on {screen.capitalize()}", TITLE)
     return [
-        title.append("   Esc closes", FAINT),
+        title.append("   Esc close", FAINT),
         *_rows(keys, column, width),
         Text(""),
         Text(" " * column).append("Signs", TITLE),
@@ -92,7 +92,7 @@ def help_lines(screen: str, width: int) -> list[Text]:
 
 
 def _rows(rows: Iterable[tuple[str, Style, str]], column: int, width: int) -> Iterator[Text]:
-    """Each with its sentence on as many lines as that takes."""
+    """Each with its explanation, wrapped."""
     for head, style, sentence in rows:
         for number, part in enumerate(wrapped(sentence, width - column, SENTENCE_LINES)):
             line = Text(no_wrap=True).append(f"{'' if number else head:<{column}}", style)

@@ -23,7 +23,7 @@ TABLE = re.compile(r"(<!-- keys of (?P<of>[a-z ]+) -->\n).*?(<!-- end of keys --
 
 
 def with_tables(text: str) -> str:
-    """A page with the present tables of keys and of screens."""
+    """Replace the tables of keys and screens in a page with the present ones."""
     text = INDEX.sub(lambda found: f"{found[1]}{screen_table()}{found[2]}", text)
     return TABLE.sub(lambda found: f"{found[1]}{key_table(found['of'])}{found[3]}", text)
 
@@ -39,7 +39,7 @@ def screen_table() -> str:
 
 
 def key_table(of: str) -> str:
-    """The keys of a screen, or of every screen, in Markdown; then what has no key."""
+    """The keys of a screen, or of every screen, in Markdown; then the actions without a key."""
     actions = list(_actions(of))
     rows = [f"| {_keys(action)} | {action.help} |" for action in actions if action.keys]
     lines = ["", "| key | what it does |", "|---|---|", *rows, ""]
@@ -49,7 +49,7 @@ def key_table(of: str) -> str:
 
 
 def key_text(key: str) -> str:
-    """A key as a page writes it: Ctrl+P, Shift+Tab, PgUp, a."""
+    """The text of a key in a page: Ctrl+P, Shift+Tab, PgUp, a."""
     if "+" in key[:-1]:
         return "+".join(part.capitalize() for part in key.split("+"))
     return KEY_NAMES.get(key, key.capitalize() if len(key) > 1 else key)
@@ -60,14 +60,14 @@ def _keys(action: Action) -> str:
 
 
 def _actions(of: str) -> Sequence[Action]:
-    """Those of a screen alone, or those of the app and the stops, which every screen has."""
+    """The actions of a screen alone, or those that every screen has."""
     if of == EVERY_SCREEN:
         return (*STOP_ACTIONS, *APP_ACTIONS)
     return next(screen.actions for screen in SCREENS if screen.name == of)
 
 
 def write_pages(folder: Path) -> None:
-    """Bring every page of a folder up to date."""
+    """Update every page of a folder."""
     for path in sorted(folder.glob("*.md")):
         path.write_text(with_tables(read_small_text(path)), "utf-8")
 

@@ -23,12 +23,12 @@ PACKAGES = (
 
 def _registered() -> Iterator[Registration]:
     for package in PACKAGES:
-        # by name: this package is below the screens, and imports none
+        # by name: this package is a layer below the screens, and must not import them
         yield from import_module(f"tui.screens.{package}.registration").REGISTERED
 
 
 SCREENS: tuple[Registration, ...] = tuple(_registered())
 TABBED = tuple(screen for screen in SCREENS if screen.digit)
-"""Screens that a digit opens, by a tab each."""
+"""Screens with a digit key and a tab."""
 EVERYWHERE = tuple(screen.name for screen in SCREENS)
 """Names of all screens."""

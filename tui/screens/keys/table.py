@@ -1,4 +1,4 @@
-"""Every action of the panel: those of the registered screens, and those of every screen.
+"""Every action of the panel: those of each registered screen, and those that all screens have.
 
 Bindings, the key bar, the help screen and the palette are made from this table.
 """
@@ -22,26 +22,26 @@ STOP = "Stop the open drive on its ramp; all drives if none is open. Not while t
 STOP_ANYWHERE = "Stop the open drive on its ramp, even while typing text."
 STOP_ALL = "Stop all drives of all open lines on their ramps."
 WHILE_OPENING: tuple[KeyLabel, ...] = (("leave", "Esc", "cancel"), ("help", "?", "help"))
-"""Keys that mean something while a line is being opened, besides those that stop."""
+"""Keys that work while a line is being opened, besides the stop keys."""
 NEVER_DROPPED = ("stop_by_space", "help")
-"""Actions in the line of keys however narrow the terminal is."""
+"""Actions that stay in the key bar in the narrowest terminal."""
 WHILE_TYPING: tuple[KeyLabel, ...] = (
-    ("command_palette", "^p", "all"),
+    ("command_palette", "^p", "more"),
     ("help", "F1", "help"),
-    ("quit", "^q", "leave"),
+    ("quit", "^q", "quit"),
 )
-"""Keys of the whole panel other than letters."""
-STOPS_ALL, STOPS_NOBODY = "STOP ALL", "cannot stop here"
+"""Keys of the panel that work while text is typed."""
+STOPS_ALL, STOPS_NONE = "STOP ALL", "cannot stop here"
 """Labels of the stop key if it stops every drive, or none."""
 SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
-OPEN = "Open a file: compare a parameter set, or propose an assignment."
+OPEN = "Open a file: compare a parameter set, or stage an assignment."
 FIND = "Find a parameter by code, name, address or value; works on every screen."
 WIRING_HELP = "Show wiring and warnings of the family: pins, line rules, LEDs, commands, errata."
 WHY = "Diagnose why a silent drive gives no answer; show the next steps."
 HEAR = "Listen to a line with another master; send nothing. Asks first."
 ACCEPT = "Accept the changed line: another adapter, or other drives. Asks first."
 BUNDLE = "Bundle everything about the line in one file, for a colleague."
-EEPROM = "Save the settings to the drive's EEPROM, if it needs that. Needs arming; asks first."
+EEPROM = "Save the settings to EEPROM, if the drive needs that. Needs arming; asks first."
 
 
 def _digit_keys(digit: str) -> str:
@@ -71,20 +71,18 @@ APP_ACTIONS: tuple[Action, ...] = (
     app_action("save_shown", "ctrl+s", "", SAVE),
     app_action("open_file", "ctrl+o", "", OPEN),
     app_action("eeprom", "S", "", EEPROM),
-    app_action("command_palette", "ctrl+p", "all", "Find an action by typing words."),
+    app_action("command_palette", "ctrl+p", "more", "Find an action by typing words."),
     app_action("help", "?,f1", "help", "Show the keys of this screen."),
     app_action("bundle", "", "", BUNDLE),
     app_action("accept_line", "", "", ACCEPT),
     app_action("redraw", "ctrl+l", "", "Redraw the screen if it is garbled."),
-    app_action(
-        "quit", "q,ctrl+q", "leave", "Leave the panel. Asks first if that has consequences."
-    ),
+    app_action("quit", "q,ctrl+q", "quit", "Quit the panel. Asks first if that has consequences."),
 )
-"""Actions of every screen, after its own."""
+"""Actions that every screen has after its own."""
 
 
 def _actions() -> Iterator[Action]:
-    """Yield the actions of all screens, one that several have once."""
+    """Yield the actions of all screens, each once."""
     yield from STOP_ACTIONS
     where: dict[Action, list[str]] = {}
     for screen in SCREENS:
@@ -135,9 +133,9 @@ def key_meanings(screen: str) -> Mapping[str, bool]:
 
 
 def keys_line(screen: str, width: int, stops: str = "STOP") -> list[KeyLabel]:
-    """The line of keys of a screen, the stop first; where it is narrow, without the last ones.
+    """The key bar of a screen, the stop first; the last keys are dropped if it is narrow.
 
-    `stops` says whom the stop key stops.
+    `stops` is the label of the stop key.
     """
     first = stop_keys(stops, typing=False)[0]
     keys = [
@@ -150,9 +148,9 @@ def keys_line(screen: str, width: int, stops: str = "STOP") -> list[KeyLabel]:
 def typing_line(
     width: int, stops: str, own: Sequence[tuple[str, str]], *, spaces: bool
 ) -> list[KeyLabel]:
-    """The line of keys while a text is typed: no letter means anything else then.
+    """The key bar while a text is typed, when letters are text.
 
-    `own` are the keys of that field and what they do; with `spaces` a space is text too.
+    `own` are the keys of the field with their labels; with `spaces` a space is text, too.
     """
     first = stop_keys(stops, typing=spaces)[0]
     keys = [first, *((f"typing {key}", key, does) for key, does in own), *WHILE_TYPING]
@@ -160,32 +158,32 @@ def typing_line(
 
 
 def opening_line(width: int, stops: str) -> list[KeyLabel]:
-    """The line of keys while a line is being opened: any other key is ignored."""
+    """The key bar while a line is being opened: all other keys are ignored."""
     return fitting([*stop_keys(stops, typing=False), *WHILE_OPENING], width, NEVER_DROPPED)
 
 
 def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
-    """The keys that stop now, as a line of keys names them: whom that key `stops`, then all.
+    """The stop keys for a key bar: the one with the label `stops`, then the one for all drives.
 
-    While a text is `typing`, Space is text and the key is F12.
+    While a text is being typed (`typing`), Space is text and the key is F12.
     """
     keys = [("stop_by_space", "F12" if typing else "Space", stops)]
-    return keys if stops in (STOPS_ALL, STOPS_NOBODY) else [*keys, ("stop_all", "F9", STOPS_ALL)]
+    return keys if stops in (STOPS_ALL, STOPS_NONE) else [*keys, ("stop_all", "F9", STOPS_ALL)]
 
 
 CAPS_LOCK = "Is Caps Lock on? {key} means: {help}"
 SHELL_KEYS = {"ctrl+z": "Ctrl+Z", "ctrl+backslash": "Ctrl+\\"}
-"""Keys by which a shell suspends or ends a program; Ctrl+C has an action of its own."""
+"""Keys by which a shell suspends or ends a program; Ctrl+C has its own action."""
 
 
 def elsewhere(screen: str, key: str, character: str | None = None) -> str:
-    """Return which screen uses a key that this one does not know; empty if none.
+    """Return which screens use a key that this one does not; empty if none.
 
-    Of a key with a sign the table has the `character`, as `*`, and not its name. If the small
-    letter works here, the text asks whether Caps Lock is on.
+    The table has the `character` of a sign, such as `*`, not Textual's name for its key. If the
+    small letter works here, the text asks if Caps Lock is on.
     """
     if shell_key := SHELL_KEYS.get(key):
-        return f"{shell_key} ends nothing here: q leaves the panel."
+        return f"{shell_key} does not end the panel. Press q to quit."
     keys = {key, character}
     found = [a for a in ACTIONS if keys & {*a.keys.split(",")} and screen not in a.screens]
     texts = [_works_on(found)] if found else []
@@ -202,15 +200,15 @@ def _works_on(found: Sequence[Action]) -> str:
     names = {tab.name: f"{tab.title} ({tab.digit})" for tab in TABBED}
     where = [names[a.screens[0]] for a in found if a.screens[0] in names] or ["another screen"]
     if len(set(where)) == 1:
-        return f"{first.shown} has a meaning on {where[0]}: {first.help}"
+        return f"{first.shown} works on {where[0]}: {first.help}"
     *most, last = sorted(set(where), key=lambda name: name[-2])
-    return f"{first.shown} has a meaning on {', '.join(most)} and {last}."
+    return f"{first.shown} works on {', '.join(most)} and {last}."
 
 
 def once_closed(screen: str, key: str, character: str | None = None) -> str:
-    """Report where a key works that the dialog over a screen does not know; empty if nowhere."""
+    """Return where a key works that the dialog over a screen does not use; empty if nowhere."""
     keys = {key, character}
     here = next((a for a in screen_actions(screen) if keys & {*a.keys.split(",")}), None)
     if here is not None:
-        return f"{here.shown} works once this is closed (Esc): {here.help}"
+        return f"Press Esc to close this first, then {here.shown}: {here.help}"
     return elsewhere(screen, key, character)

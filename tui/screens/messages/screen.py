@@ -1,4 +1,4 @@
-"""Messages: everything that was said, newest first, with its time."""
+"""Messages: all messages, newest first, with their times."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
 
 from ..base import PanelScreen
+from ..frame import with_drive
 from ..keys.action import MESSAGES
 from ..keys.table import bindings
 
@@ -41,13 +42,13 @@ class MessagesScreen(PanelScreen):
         yield Lines(id="list")
 
     def draw(self, width: int) -> None:
-        """The newest first, from where the person has scrolled to."""
+        """Show the messages from the scroll position on, the newest first."""
         super().draw(width)
         events = self.app.events.events
-        self.put("title", [rule("Messages", width, f"{len(events)} kept" if events else "")])
+        self.put("title", [rule("Messages", width, f"{len(events)} messages" if events else "")])
         lines = [line for event in reversed(events) for line in event_lines(event, width)]
         if not lines:
-            lines = [Text(" Nothing was said yet.", FAINT)]
+            lines = [Text(" No messages yet.", FAINT)]
         room = max(1, self.size.height - 2)
         self._offset = max(0, min(self._offset, len(lines) - room))
         self.put("list", lines[self._offset : self._offset + room])
@@ -59,12 +60,11 @@ class MessagesScreen(PanelScreen):
 
 
 def event_lines(event: Event, width: int) -> list[Text]:
-    """A message with its time and its drive, on as many lines as it takes."""
-    who = f"{event.device}: " if event.device is not None else ""
+    """A message with its time and its drive, on at most `MESSAGE_LINES` lines."""
     style = EVENT_STYLES.get(event.kind, FAINT)
     found = []
     for number, part in enumerate(
-        wrapped(who + event.text, width - EVENT_TIME_WIDTH - 1, MESSAGE_LINES)
+        wrapped(with_drive(event), width - EVENT_TIME_WIDTH - 1, MESSAGE_LINES)
     ):
         at = time.strftime("%H:%M:%S", time.localtime(event.wall)) if not number else ""
         line = Text(f" {at:<{EVENT_TIME_WIDTH - 1}}", FAINT, no_wrap=True)

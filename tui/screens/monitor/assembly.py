@@ -39,7 +39,7 @@ def notice_lines(view: View, width: int) -> list[Text]:
     if view.snapshot is None or view.lost or view.snapshot.state.kind == "fault":
         return []
     control = view.control
-    no_effect = f"No effect: {control.hindrance.sentence}" if control.hindrance else ""
+    no_effect = f"No effect. {control.hindrance.sentence}" if control.hindrance else ""
     for message, style in (
         (control.offer, ATTENTION),
         (control.lost, ALARM),

@@ -24,7 +24,7 @@ HAND_BACK = (
     "Return control to the terminals. Needs arming; asks first."
     " A run command active there starts the motor."
 )
-GIVE_BY = "Set the reference by a preset with a learned scale, or end that. Asks first."
+GIVE_BY = "Set the reference by a learned preset, or end that. Asks first."
 TAKE_OVER = "Take over a motor whose program has ended; sends nothing. Needs arming."
 INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V."
 

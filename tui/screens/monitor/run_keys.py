@@ -45,7 +45,7 @@ class RunKeys(OrderKeys):
         wanted = self.commander.given.wanted
         text, unit = proposed(profile, wanted.text if wanted else "", image.raws, image.lacking)
         if purpose == "reference" and not unit:
-            self._refuse(f"Where {profile.name} takes its reference is not known.")
+            self._refuse(f"{profile.name} has no known parameter for its reference.")
             return
         now = self.app.clock.monotonic()
         self._line = RunLine(purpose, text, unit, now, self.session.work.stops)
@@ -182,8 +182,8 @@ class RunKeys(OrderKeys):
 
 
 def _after_esc(way: str) -> str:
-    """The way out by a key, which types into the line as long as that is open."""
-    return f"Esc, then {way}" if way[1:2] == " " else way
+    """The remedy by a key, which works once the run line is closed."""
+    return way.replace("Press ", "Press Esc, then ", 1) if way.startswith("Press ") else way
 
 
 def _alone(event: Key) -> bool:
@@ -198,7 +198,7 @@ def _steps(event: Key) -> bool:
     return stroke is None or stroke.steps
 
 
-NOT_SIMULATED = "Inputs are set at the terminals; this panel sets only those of a simulated drive."
+NOT_SIMULATED = "Inputs are set at the terminals. Only a simulated drive's inputs can be set here."
 LOOKS_LIKE = "LI1=1,AI1=5V: logic inputs 1 or 0, analog 5V, 12mA, 50%."
 
 

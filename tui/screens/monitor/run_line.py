@@ -209,7 +209,7 @@ def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Styl
     if line.fault:
         message, style = line.fault, ALARM
     elif hindrance and line.purpose != "reference":
-        message, style = f"No effect: {hindrance}", ALARM
+        message, style = f"No effect. {hindrance}", ALARM
     elif line.is_zero and line.purpose != "reference":
         message, style = "The reference is 0. Type a reference.", ATTENTION
     else:
@@ -224,7 +224,7 @@ def _first(
     first = Text(" ")
     first.append(RUN_HEADINGS[line.purpose], STRONG)
     if not line.unit:
-        return first.append("  the reference is given at the drive", FAINT)
+        return first.append("  the reference is set at the drive", FAINT)
     first.append(" at ", STRONG)
     first.append(f" {line.text:>{DIGITS_MOST}} ", "bold white on #101214")
     first.append(f" {line.unit}  ", PLAIN)

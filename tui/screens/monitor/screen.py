@@ -260,9 +260,8 @@ class MonitorScreen(CursorKeys):
                 self.session.ratings[current.code] = rated
                 self.look()
 
-        about = f"100 % of {current.code}, from the nameplate of the drive; base: " + (
-            current.base or "not confirmed by a manual"
-        )
+        base = current.base or "not confirmed by a manual"
+        about = f"The current at 100 % of {current.code}, from the drive's nameplate. Base: {base}."
         requested = Ask("Rated current in A", fault_of_rating, about=about, number=True)
         self.app.push_screen(requested, reported)
 
@@ -337,4 +336,4 @@ def fault_of_rating(text: str) -> str:
     except InvalidOperation:
         return f"{text!r} is not a number. Write it like 9.1."
     fits = number.is_finite() and 0 < number < 10000
-    return "" if fits else "A rated current is between 0 and 10 000 A."
+    return "" if fits else "A rated current is above 0 and below 10,000 A."

@@ -41,8 +41,8 @@ HEADS = {
     Phase.FAILED: (" NOT STOPPED ", FAULT_BLOCK),
 }
 SWAPPED = "in each word: check the byte order of the gateway or converter"
-SAYS_WHY = "press N"
-"""Told where there is room for it."""
+KEY_TO_DIAGNOSE = "press N"
+"""Shown if there is room for it."""
 
 
 def state_lines(view: View, width: int) -> list[Text]:
@@ -101,7 +101,7 @@ def _lost(view: View, words: str, width: int) -> tuple[Text, list[Text]]:
     age = age_text(view.age or 0.0)
     was = view.was or (view.snapshot.state.headline if view.snapshot else "")
     known = f"STATE UNKNOWN for {age}"
-    reported = f"{known}, {SAYS_WHY}"
+    reported = f"{known}, {KEY_TO_DIAGNOSE}"
     lines = [Text(short(reported if len(reported) <= width else known, width), ALARM)]
     lines.append(Text(short(f"was {was}" if was else "", width), FAINT))
     lines += [Text(line, ALARM) for line in wrapped(countdown(view), width, 2)]

@@ -137,7 +137,7 @@ class View:
         if self.snapshot is None or self.snapshot.error:
             return self.snapshot.error if self.snapshot is not None else ""
         if self.snapshot.is_stale(self.now):
-            return f"Nothing was read for {age_text(self.now - self.snapshot.time)}."
+            return f"No values read for {age_text(self.now - self.snapshot.time)}."
         return ""
 
 

@@ -130,7 +130,7 @@ def _alarms(view: View) -> tuple[str, Style]:
         return "shown by the status word", ALARM
     watched = [view.profile[value.parameter] for value in view.values]
     tells = state.alarm is not None or any(bit.alarm for word in watched for bit in word.bits)
-    return ("none" if tells else "not told by this drive"), FAINT
+    return ("none" if tells else "not reported by this drive"), FAINT
 
 
 def has_alarm(view: View) -> bool:

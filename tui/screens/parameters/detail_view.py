@@ -27,21 +27,21 @@ from .value_text import (
 )
 
 SHORT, TALL = 5, 8
-"""Lines for one parameter; the second where the terminal has the room."""
+"""Lines for one parameter, in a low and in a tall terminal."""
 TALL_FROM = 32
-"""Rows of a terminal that has."""
+"""Rows from which a terminal is tall."""
 
 
 def parameter_lines(
     editor: Editor, code: str, width: int, height: int, step: str = ""
 ) -> list[Text]:
-    """Return the details of one parameter in so many lines, the last for its news.
+    """Return the details of one parameter in `height` lines, the last for its latest event.
 
-    `step` is what a first commissioning does with it, where that is what is looked at.
+    `step` is its text in the commissioning steps, if those are shown.
     """
     parameter = editor.session.profile[code]
     news = _news(editor, parameter)
-    # what warns is told whole, at the cost of help
+    # a warning is shown in full, at the cost of help
     most = 3 if height > SHORT else 1 if news.style == PLAIN else 2
     reported = wrapped(news.plain, max(20, width - 3), most)
     lines = _help(editor, parameter, width, height - 2 - max(1, len(reported)), step)
@@ -51,13 +51,13 @@ def parameter_lines(
 
 
 def _help(editor: Editor, parameter: Parameter, width: int, room: int, step: str) -> list[Text]:
-    """Code, whole name, what it does; as many lines as there is room for."""
+    """Code, full name and help, in at most `room` lines."""
     head = f"{parameter.code}  {parameter.name}"
     reported = [*([step] if step else []), *_help_parts(editor, parameter)]
     words = " ".join(part if part.endswith(".") else f"{part}." for part in reported)
     parts = wrapped(f"{head}. {words}" if words else head, max(20, width - 3), room)
     lines = [Text(f" {part}", FAINT, no_wrap=True) for part in parts]
-    # the name may reach into the second line where the terminal is narrow
+    # in a narrow terminal the name may continue on the second line
     left = len(head)
     for line, part in zip(lines, parts, strict=True):
         line.stylize(PLAIN, 1, 1 + max(0, min(left, len(part))))
@@ -85,7 +85,7 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
     if parameter.base:
         found.append(f"In percent of {parameter.base}")
     if parameter.scale_by is not None and parameter.scale_by.parameter not in parameter.note:
-        found.append(f"Its step follows {parameter.scale_by.parameter}")
+        found.append(f"Its step depends on {parameter.scale_by.parameter}")
     if is_enumeration(parameter) and parameter.access != "r":
         choices = dict.fromkeys(editor.session.profile.names(parameter).values())
         found.append(f"One of: {', '.join(choices)}")
@@ -93,22 +93,22 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
 
 
 def _taught(editor: Editor, parameter: Parameter) -> list[str]:
-    """Return the scale that a person taught, or that it can be taught."""
+    """Return the learned scale, or how to learn one; empty if it has a scale."""
     session = editor.session
     if (scale := session.profile.taught.get(parameter.code)) is not None:
-        return [f"Taught: {scale.text}; L looks again"]
+        return [f"Learned scale: {scale.text}. Press L to check it against the display"]
     if parameter.access != "r" or why_not_taught(session.family, parameter.code):
         return []
-    return ["L or Enter teaches its scale by the drive's display"]
+    return ["Press L or Enter to learn its scale from the drive's display"]
 
 
 def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:
-    """The limits in force, when a new value counts, how long it is kept, the factory value."""
+    """The active limits, when a new value takes effect, how it is saved, the factory value."""
     text = Text(" ", no_wrap=True)
     number = not is_enumeration(parameter) and limits_now(editor, parameter) is not None
     if parameter.access != "r" and number:
         limits, step = range_text(editor, parameter), step_text(editor, parameter)
-        by = step.partition(" ")[0]  # its unit stands there already
+        by = step.partition(" ")[0]  # the limits already name the unit
         text.append(f"{limits}, step {by}" if limits else f"step {step}", PLAIN)
         text.append(" · ", FAINT)
     text.append(" · ".join(_effect(editor, parameter)), FAINT)
@@ -120,14 +120,14 @@ def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:
             text.append(" · ", FAINT).append("S", KEY).append(" save", FAINT)
     factory = f" · factory {factory_text(editor, parameter)}"
     if factory_text(editor, parameter) and text.cell_len + len(factory) < width:
-        text.append(factory, FAINT)  # stands in the list too
+        text.append(factory, FAINT)  # optional: the list shows it, too
     return text
 
 
 def _effect(editor: Editor, parameter: Parameter) -> list[str]:
     profile = editor.session.profile
     if parameter.access == "r":
-        return ["can only be read"]
+        return ["read-only"]
     later = waits_for_reset(profile, parameter)
     found = ["takes effect after a reset"] if later else []
     if needs_standstill(profile, parameter):
@@ -141,7 +141,7 @@ def _effect(editor: Editor, parameter: Parameter) -> list[str]:
 
 
 def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
-    """Return its address and raw value, and how certain that is."""
+    """Return its address, raw value and source."""
     raw, edit = editor.values.raws.get(parameter.code), editor.staging.edits.get(parameter.code)
     hexadecimal = f"16#{parameter.address:04X}"
     number = parameter.number if parameter.number not in (hexadecimal, parameter.code) else ""
@@ -163,7 +163,7 @@ def _word(raw: int) -> str:
 
 
 def _news(editor: Editor, parameter: Parameter) -> Text:
-    """Return the last event: another's change, a refusal, an old value, a remark."""
+    """Return the latest event: a change by another program, a refusal, a staged or old value."""
     code = parameter.code
     edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
     if code in editor.staging.changed_elsewhere:
@@ -178,16 +178,16 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     refused = editor.refusal(code)
     locked = refused.text if refused is not None and refused.reason == "running" else ""
     if edit is not None and locked:
-        return Text(f"→ {edit.text} is staged. {locked}", ALARM)
+        return Text(f"Staged: {edit.text}. {locked}", ALARM)
     if edit is not None:
         keys = _keys_to_write(editor, "it")
-        message = f"{edit.old_text or NOT_AVAILABLE} → {edit.text} is staged; {keys}."
+        message = f"Staged: {edit.old_text or NOT_AVAILABLE} → {edit.text}. {keys}."
         return Text(f"{message} {edit.remark}".strip(), ALARM if edit.remark else ATTENTION)
     if code in editor.waits_for_reset:
         return Text("Takes effect after a reset of the drive.", ALARM)
     if old := old_text(editor, code):
         message = f"Now {value_text(editor, code)}, was {old}"
-        # u takes back what is staged first
+        # u would first undo staged edits
         u = "" if len(editor.staging.edits) else " Press u to stage the old value."
         return Text(f"{message}.{u}", PLAIN)
     if code not in editor.values.raws:
@@ -200,35 +200,35 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
 
 
 def _keys_to_write(editor: Editor, what: str) -> str:
-    """The keys that write what is staged, in a few words; or that none does now."""
+    """The keys that write staged values, as a sentence without a full stop."""
     arming = editor.session.arming
     if arming.hindrance:
-        return "cannot be written now"
-    return f"press w to write {what}" if arming.armed else "press a to arm, then w"
+        return "Cannot be written now"
+    return f"Press w to write {what}" if arming.armed else "Press a to arm, then w"
 
 
 def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
-    """Return the factory value of a changed setting, and how certain that is."""
-    message = f"Not the factory value, {factory_text(editor, parameter)}"
+    """Return the factory value of a changed setting, and its source if it is not certain."""
+    message = f"Differs from the factory value, {factory_text(editor, parameter)}"
     grounds = parameter.factory_grounds
     if grounds is None or factory_is_sure(parameter):
         return f"{message}."
-    return f"{message}: from {CONFIDENCE_WORDS[grounds.confidence]}, unverified."
+    return f"{message} (source: {CONFIDENCE_WORDS[grounds.confidence]}, unverified)."
 
 
 def status_line(editor: Editor, where: str, width: int) -> Text:
-    """The line between list and detail: what waits to be written, kept or reset, and where."""
+    """The line between list and details: what is staged, not saved, or needs a reset."""
     text, count = Text("─ ", LINE, no_wrap=True), len(editor.staging.edits)
     text.append(f"{count} staged", ATTENTION if count else FAINT)
     if count:
-        text.append(f": {_keys_to_write(editor, 'it' if count == 1 else 'them')}", FAINT)
+        text.append(f". {_keys_to_write(editor, 'it' if count == 1 else 'them')}", FAINT)
     if editor.unsaved:
         text.append(" · ", LINE)
         text.append(f"{len(editor.unsaved)} not saved", ALARM)
         text.append(": S", KEY)
     if editor.waits_for_reset:
         text.append(" · ", LINE)
-        text.append(", ".join(sorted(editor.waits_for_reset)) + " after a drive reset", ALARM)
+        text.append(f"reset the drive for {', '.join(sorted(editor.waits_for_reset))}", ALARM)
     done, whole = editor.values.progress
     if done < whole:
         where = f"reading {done} of {whole} · {where}"

@@ -1,4 +1,4 @@
-"""Dialogs that take a new value: a number as it is typed, a name from a list, bits of a word."""
+"""Dialogs for a new value: a typed number, a name from a list, the bits of a word."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from .value_text import factory_text, limits_now, step_text, value_text
 if TYPE_CHECKING:
     from ..dialogs.now import MotorStates
 
-ROUNDED = "rounded to what the drive can hold"
-STAGES_NOTHING = ("Esc", "cancel")
+ROUNDED = "rounded to the drive's resolution"
+STAGES_NOTHING = ("Esc", "Cancel")
 
 
 class EditNumber(Question[str | None]):
-    """A number with its unit: checked while it is typed, shown as the drive will hold it."""
+    """A number with its unit: checked while typed, and shown as the drive will store it."""
 
     BINDINGS: ClassVar = [
         Binding("up", "step(1)", "one step up", show=False),
@@ -48,7 +48,7 @@ class EditNumber(Question[str | None]):
         self._editor, self._parameter = editor, parameter
 
     def dialog(self) -> ComposeResult:
-        """The field, the resulting value, and the known facts."""
+        """The field, the resulting value, and facts about the parameter."""
         editor, parameter = self._editor, self._parameter
         staged = editor.staging.edits.get(parameter.code)
         raw = staged.new if staged else editor.values.raws.get(parameter.code)
@@ -59,20 +59,20 @@ class EditNumber(Question[str | None]):
             yield NumberInput(value.text if value else "", id="answer", select_on_focus=True)
             yield Plain("", id="held")
             yield Plain(about_number(editor, parameter), id="about")
-            steps = (("Up Down", "step"), ("PgUp PgDn", "ten"))
-            keys = (("Enter", "stage it"), *steps, STAGES_NOTHING)
+            steps = (("Up, Down", "1 step"), ("PgUp, PgDn", "10 steps"))
+            keys = (("Enter", "Stage"), *steps, STAGES_NOTHING)
             yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:
-        """Show the contents."""
+        """Show the value of the initial text."""
         self._check(self.query_one(Input).value)
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """Show the resulting value at once."""
+        """Show the resulting value while typing."""
         self._check(event.value)
 
     def _check(self, text: str) -> bool:
-        """Show the value of the text; whether it may be staged."""
+        """Show the value of the text, or its error; return True if it can be staged."""
         held = self.query_one("#held", Plain)
         editor, parameter = self._editor, self._parameter
         values = editor.values
@@ -91,7 +91,7 @@ class EditNumber(Question[str | None]):
         edit = edits.get(parameter.code)
         if edit is None:
             same = next(item for item in edits.requested if item.code == parameter.code)
-            reported = Text("as it is held now", FAINT)
+            reported = Text("unchanged: the drive holds this value", FAINT)
             if same.rounded:
                 reported.append(f": {same.text}   {ROUNDED}", ALARM)
             held.update(reported)
@@ -106,7 +106,7 @@ class EditNumber(Question[str | None]):
         return True
 
     def action_step(self, steps: int) -> None:
-        """The next value that the drive can hold."""
+        """Go to the next value that the drive can store, so many steps away."""
         editor, parameter = self._editor, self._parameter
         profile, field = editor.session.profile, self.query_one(Input)
         raws, lacking = editor.values.raws, editor.values.lacking
@@ -121,13 +121,13 @@ class EditNumber(Question[str | None]):
         field.cursor_position = len(field.value)
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Give it back once nothing is wrong with it."""
+        """Answer with the text if it is valid."""
         if self._check(event.value):
             self.answer(event.value.strip())
 
 
 def about_number(editor: Editor, parameter: Parameter) -> str:
-    """Return the hints on a number: held, staged, factory; limits in force, the step."""
+    """Return the present, staged and factory values, the active limits and the step."""
     now = f"drive holds {value_text(editor, parameter.code)}"
     edit, factory = editor.staging.edits.get(parameter.code), factory_text(editor, parameter)
     reported = [now, *([f"staged {edit.text}"] if edit else [])]
@@ -135,7 +135,7 @@ def about_number(editor: Editor, parameter: Parameter) -> str:
     limits = limits_now(editor, parameter, staged=True)
     bounds = f"limits {limits.text}" if limits and limits.text else "limits not documented"
     step = step_text(editor, parameter)
-    return f"{'   '.join(reported)}\n{bounds}{f'   one step {step}' if step else ''}"
+    return f"{'   '.join(reported)}\n{bounds}{f'   step {step}' if step else ''}"
 
 
 class PickValue(KeyQuestion[int | None]):
@@ -151,7 +151,7 @@ class PickValue(KeyQuestion[int | None]):
         self._factory = factory_raw(profile, parameter, values.raws, values.lacking)
 
     def dialog(self) -> ComposeResult:
-        """The list with the held value marked."""
+        """The list, with the present value marked."""
         with Vertical(id="dialog"):
             yield Plain(f"{self._parameter.code}  {self._parameter.name}", id="question")
             yield from self.now_lines()
@@ -160,10 +160,10 @@ class PickValue(KeyQuestion[int | None]):
                 id="choices",
                 compact=True,
             )
-            yield Plain(hint(("Enter", "stage it"), STAGES_NOTHING), id="hint")
+            yield Plain(hint(("Enter", "Stage"), STAGES_NOTHING), id="hint")
 
     def on_mount(self) -> None:
-        """Begin at the staged or held value."""
+        """Select the staged value, else the present one."""
         code = self._parameter.code
         staged = self._editor.staging.edits.get(code)
         raw = staged.new if staged else self._editor.values.raws.get(code)
@@ -182,7 +182,7 @@ class PickValue(KeyQuestion[int | None]):
         return text
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Give the raw value back."""
+        """Answer with the raw value."""
         self.answer(self._names[event.option_index][0])
 
 
@@ -204,14 +204,14 @@ class EditBits(KeyQuestion[int | None]):
         self._word = (staged.new if staged else held) & 0xFFFF
 
     def dialog(self) -> ComposeResult:
-        """Every named bit; reserved ones cannot be chosen."""
+        """All named bits; reserved ones are disabled."""
         parameter = self._parameter
         with Vertical(id="dialog"):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
             yield from self.now_lines()
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="held")
-            keys = (("Enter", "change a bit"), ("s", "stage the word"), STAGES_NOTHING)
+            keys = (("Enter", "Toggle bit"), ("s", "Stage the word"), STAGES_NOTHING)
             yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:
@@ -234,12 +234,12 @@ class EditBits(KeyQuestion[int | None]):
         self.query_one("#held", Plain).update(Text(shown, STRONG))
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Turn the bit over."""
+        """Toggle the bit."""
         self._word ^= 1 << self._parameter.bits[event.option_index].bit
         self._show(event.option_index)
 
     def action_take(self) -> None:
-        """Give the word back."""
+        """Answer with the word."""
         self.answer(self._word)
 
 
@@ -249,7 +249,7 @@ Dialog = EditNumber | PickValue | EditBits
 def dialog_for(
     editor: Editor, parameter: Parameter, now: MotorStates | None = None
 ) -> Callable[[], Dialog]:
-    """The dialog that fits a parameter; a stop of the drives of `now` ends it."""
+    """The dialog for a parameter's kind; a stop of the drives of `now` cancels it."""
     from tui.drive.values import is_enumeration
 
     if parameter.bits:

@@ -13,7 +13,7 @@ from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, PLAIN, STRONG
 
 FILTER_LABELS: dict[str, str] = {
     "not factory": "Changed",
-    "start-up": "Simply start",
+    "start-up": "Commissioning",
     "favorites": "Favorites",
     "staged": "Staged",
     "differs": "Differs",
@@ -26,18 +26,18 @@ FILTER_LABELS: dict[str, str] = {
 }
 """Names of the filters."""
 STYLES = {"staged": ATTENTION, "unsaved": ALARM}
-"""Filters whose number is a state that wants to be seen."""
+"""Styles of filters whose number needs attention."""
 
 
 @dataclass(frozen=True, slots=True)
 class GroupEntry:
-    """One line of the column: what it chooses, and how many parameters that are."""
+    """One line of the column: its choice, and the number of its parameters."""
 
     choice: Choice
     count: int | None = None
-    """None if the number identifies none."""
+    """None if no number is shown."""
     pinned: bool = False
-    """True if it stays above the groups however far they are scrolled."""
+    """True if it stays above the scrolled groups."""
 
     @property
     def label(self) -> str:
@@ -47,7 +47,7 @@ class GroupEntry:
 
 
 def group_lines(entries: Sequence[GroupEntry], chosen: Choice, width: int, room: int) -> list[Text]:
-    """As many lines as fit: the pinned ones, and those around the chosen one."""
+    """The lines that fit: the pinned ones, and those around the chosen one."""
     pinned = [entry for entry in entries if entry.pinned]
     rest = [entry for entry in entries if not entry.pinned]
     left = max(1, room - len(pinned))

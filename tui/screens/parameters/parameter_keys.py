@@ -1,4 +1,4 @@
-"""Subjects of the keys of the Parameters screen: the list, staged edits, messages."""
+"""Common parts of the keys of the Parameters screen: the list, the editor, messages."""
 
 from __future__ import annotations
 
@@ -29,26 +29,26 @@ class ParameterKeys(TeachKeys):
         return self.console.editor
 
     def list_again(self) -> None:
-        """Make the list again, by the choice and the search."""
+        """Fill the list again, for the present choice and search."""
         for search in self.query(WordField):  # none once the screen was left
             self.listed.fill(self.editor, search.words)
             self.look()
 
     def clear_search(self) -> None:
-        """Nothing is searched for: the list is that of what was chosen."""
+        """Clear the search, and show the chosen group or selection."""
         for search in self.query("#search").results(Input):
             with search.prevent(Input.Changed):
                 search.value = ""
         self.list_again()
 
     def note(self, text: str, keys: str = "") -> None:
-        """Report the result of a key, and which `keys` of this screen go on from there."""
+        """Report the result of a key, and the next `keys` on this screen."""
         self._add("told", text)
         if keys:
             self.hint_keys(keys)
 
     def _refuse(self, text: str) -> None:
-        """Say why something was not done."""
+        """Report why something was not done."""
         self._add("refused", text)
 
     def _add(self, kind: str, text: str) -> None:

@@ -1,4 +1,4 @@
-"""The list of the Parameters screen: what it holds, where the cursor is, what fits."""
+"""The list of the Parameters screen: its lines, its cursor and its visible part."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ from .start_up_view import start_up_items
 from .table_view import TableLine, items_of
 
 FIRST: tuple[FilterId, ...] = ("not factory", "favorites", "staged", "unsaved")
-"""Filters above the groups; after a comparison `differs` is there too."""
+"""Filters above the groups; after a comparison also `differs`."""
 LAST: tuple[FilterId, ...] = ("recent", "unverified", "read-only", "settings", "all")
 """Filters below the groups."""
 
 
 @dataclass(slots=True)
 class ParameterList:
-    """Lines of parameters and headings; the cursor is on a parameter, where there is one."""
+    """Lines of parameters and headings; the cursor is on a parameter, if there is one."""
 
     chosen: Choice = field(default_factory=Choice)
     searched: bool = False
-    """True if it shows what was found in place of what was chosen."""
+    """True if it shows the result of a search instead of the chosen group or filter."""
     items: Sequence[TableLine] = field(default_factory=list)
     at: int = 0
     """The line of the cursor."""
@@ -44,7 +44,7 @@ class ParameterList:
 
     @property
     def code(self) -> str:
-        """The parameter under the cursor, or nothing."""
+        """The parameter under the cursor; empty if none."""
         return self.items[self.at].code if self.at < len(self.items) else ""
 
     @property
@@ -54,23 +54,23 @@ class ParameterList:
 
     @property
     def place(self) -> int:
-        """The how many-th parameter is under the cursor, from 1."""
+        """Position of the parameter under the cursor among all, from 1."""
         return sum(1 for item in self.items[: self.at + 1] if item.code)
 
     def shown_as(self, editor: Editor) -> Choice:
-        """The choice that is marked: of what was found, the group of that under the cursor."""
+        """The choice to highlight; during a search, the group of the selected parameter."""
         if self.searched and self.code:
             return Choice(group=editor.session.profile[self.code].group)
         return self.chosen
 
     def fill(self, editor: Editor, search: str) -> None:
-        """Make the list again; the cursor stays on its parameter where that is still in it."""
+        """Fill the list; the cursor stays on its parameter if that is still listed."""
         profile, before = editor.session.profile, self.code
         if not self.groups:
             self.groups, self.home = group_order(profile), home_group(profile)
             self.chosen = Choice(group=self.home)
         if self.searched and not search and before and self.chosen.group:
-            # where the search has led to is where the list goes on
+            # after a search, the group of the found parameter is shown
             self.chosen = Choice(group=profile[before].group)
         self.searched = bool(search.split())
         facts = editor.facts
@@ -84,12 +84,12 @@ class ParameterList:
         self.at = found[0] if found else self._first_row(0, 1)
 
     def best(self) -> None:
-        """Forget the parameter under the cursor: the next filling chooses its first."""
+        """Make the next `fill` select the first parameter."""
         self.at = len(self.items)
 
     def entries(self, facts: FilterContext) -> list[GroupEntry]:
         """The lines of the column at the left."""
-        # not by the rows themselves: this is drawn four times a second
+        # counted without making the rows, as this is drawn four times a second
         known = sum(facts.profile.get(code) is not None for code in facts.favorites)
         counts = {"favorites": known, "staged": len(facts.edits), "unsaved": len(facts.unsaved)}
         counts["not factory"] = len(rows(facts, "not factory"))
@@ -105,16 +105,16 @@ class ParameterList:
         return [*first, *groups, *(GroupEntry(Choice(literal_type)) for literal_type in LAST)]
 
     def choose(self, choice: Choice) -> None:
-        """Show something else; the next filling does it."""
+        """Choose a group or a filter; the next `fill` shows it."""
         self.chosen, self.searched = choice, False
         self.best()
 
     def go_home(self) -> None:
-        """Back to the group that the screen begins with."""
+        """Return to the group that the screen starts with."""
         self.choose(Choice(group=self.home))
 
     def choose_next(self, facts: FilterContext, step: int) -> None:
-        """The next or previous filter that shows anything."""
+        """Choose the next or previous filter that is not empty."""
         at = FILTERS.index("settings" if self.chosen.group else self.chosen.filter)
         for _ in FILTERS:
             at = (at + step) % len(FILTERS)
@@ -123,7 +123,7 @@ class ParameterList:
         self.choose(Choice(FILTERS[at]))
 
     def group(self, editor: Editor, step: int) -> None:
-        """The next or previous line of the column at the left that shows anything."""
+        """Choose the next or previous entry of the left column that is not empty."""
         entries = self.entries(editor.facts)
         marked = self.shown_as(editor)
         at = next((n for n, entry in enumerate(entries) if entry.choice == marked), 0)
@@ -134,7 +134,7 @@ class ParameterList:
         self.choose(entries[at].choice)
 
     def move_to(self, at: int, step: int) -> None:
-        """The cursor on this line, or the nearest parameter in the direction of `step`."""
+        """Move the cursor to this line, or to the next parameter in the direction of `step`."""
         at = self._within(at)
         found = self._first_row(at, step)
         if self.items and not self.items[found].code:
@@ -142,15 +142,15 @@ class ParameterList:
         self.at = found
 
     def move(self, lines: int) -> None:
-        """The cursor so many lines down, or up."""
+        """Move the cursor down by so many lines; negative is up."""
         self.move_to(self.at + lines, 1 if lines > 0 else -1)
 
     def end(self, to: int) -> None:
-        """The first parameter for a negative number, else the last."""
+        """Move the cursor to the first parameter for a negative number, else to the last."""
         self.move_to(0 if to < 0 else len(self.items) - 1, -to)
 
     def window(self, room: int) -> Sequence[TableLine]:
-        """The lines that fit, the cursor's among them, with the headings just above it."""
+        """The visible lines, with the cursor and the headings just above it."""
         first = self.at
         while first > max(0, self.at - room + 1) and not self.items[first - 1].code:
             first -= 1
@@ -161,13 +161,13 @@ class ParameterList:
         return min(max(at, 0), max(0, len(self.items) - 1))
 
     def _first_row(self, at: int, step: int) -> int:
-        """The nearest line from here on that is a parameter."""
+        """The first parameter line from `at` on, in the direction of `step`."""
         while 0 <= at < len(self.items) and not self.items[at].code:
             at += step
         return self._within(at)
 
 
 def shows_steps(listed: ParameterList) -> bool:
-    """Return True if a list shows the steps of a first commissioning."""
+    """Return True if a list shows the commissioning steps."""
     chosen = listed.chosen
     return chosen.filter == "start-up" and not chosen.group and not listed.searched

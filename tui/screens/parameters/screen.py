@@ -1,4 +1,4 @@
-"""Parameters: every word of the drive by group, edited in its unit, staged, written, read back."""
+"""Parameters: every parameter by group; edited in its unit, staged, written, read back."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ NARROW, WIDE = 72, 110
 
 
 class ParametersScreen(StageKeys, WriteKeys, SetKeys):
-    """A table with a cursor; the editor does the reading and the writing."""
+    """A table with a cursor; the editor reads and writes."""
 
     CSS_PATH = "parameters.tcss"
     BINDINGS: ClassVar = bindings(PARAMETERS)
@@ -49,7 +49,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     AUTO_FOCUS = ""
 
     def body(self) -> ComposeResult:
-        """The groups at the left, under the search; the list; the parameter under the cursor."""
+        """Search and groups at the left, the table, the details of the selected parameter."""
         with Horizontal(id="middle"):
             with Vertical(id="left"):
                 with Horizontal(id="find"):
@@ -63,12 +63,12 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         yield Lines(id="detail")
 
     def on_mount(self) -> None:
-        """Begin to read."""
+        """Start reading."""
         self.editor.values.start()
         self.call_after_refresh(self.list_again)
 
     def on_unmount(self) -> None:
-        """Read no more; what is staged stays."""
+        """Stop reading; staged edits are kept."""
         self.editor.values.stop()
         self.editor.values.visible = ()
 
@@ -77,7 +77,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         return max(1, self.query_one("#table").size.height)
 
     def draw(self, width: int) -> None:
-        """The groups, the lines around the cursor, and what is known of the one under it."""
+        """Draw the groups, the lines around the cursor, and the details of the selected one."""
         super().draw(width)
         self.set_class(width < NARROW, "narrow")
         self.set_class(width >= WIDE, "wide")
@@ -100,7 +100,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             for place, item in enumerate(shown, start=self.listed.top)
         ]
         self.put("table", table or [Text(self._empty(), FAINT)])
-        other = editor.other_label  # a file keeps its name as it is
+        other = editor.other_label  # a file name keeps its lowercase letters
         self.put("columns", [head_line(layout.columns, "Factory" if other == "factory" else other)])
         self._draw_groups()
         self.put("status", [status_line(editor, self._where(), width)])
@@ -117,72 +117,72 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             self.put("groups", lines)
 
     def _where(self) -> str:
-        """Return the listed parameters, and the cursor's place among them."""
+        """Return the name of the list, the cursor's place in it, and its length."""
         listed = self.listed
         if self.reading:
             return self.reading
         name = listed.chosen.group or FILTER_LABELS[listed.chosen.filter]
         if listed.searched:
-            name = "found"
+            name = "Found"
         return f"{name} {listed.place} of {listed.count}" if listed.count else f"{name} 0"
 
     def _empty(self) -> str:
         if self.query_one("#search", Input).value:
             return " No match. Press Esc to clear the search."
-        return " Nothing here. Tab chooses another group."
+        return " Nothing here. Press Tab for the next group."
 
     # Keys that move
 
     def action_move(self, lines: int) -> None:
-        """Up or down."""
+        """Move the cursor by so many lines."""
         self.listed.move(lines)
         self.look()
 
     def action_page(self, pages: int) -> None:
-        """A screen up or down."""
+        """Move the cursor by so many screens."""
         self.listed.move(pages * max(1, self._room - 1))
         self.look()
 
     def action_end(self, to: int) -> None:
-        """The first or the last."""
+        """Go to the first (below 0) or the last parameter."""
         self.listed.end(to)
         self.look()
 
     # Keys that choose what is listed
 
     def action_group(self, step: int) -> None:
-        """The next or previous group, or one of the selections above and below them."""
+        """Go to the next or previous group, or to a selection above or below the groups."""
         self.listed.group(self.editor, step)
         self.clear_search()
 
     def action_filter(self, step: int) -> None:
-        """The next selection that shows anything."""
+        """Show the next selection that is not empty."""
         self.listed.choose_next(self.editor.facts, step)
         self.clear_search()
 
     def action_search(self) -> None:
-        """Into the search, at once: what is typed next is searched for."""
+        """Focus the search field immediately, so that the next key is typed into it."""
         self.set_focus(self.query_one("#search", Input))
         # its words are prepared at the first search: not while a key is typed
         prepared = asyncio.to_thread(parameter_search, self.session.profile)
         self.run_worker(prepared, group="search", exclusive=True)
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
-        """Those of the search."""
-        return ("Enter", "to the list"), JOINS_KEY, ("Esc", "clear")
+        """The keys of the search field."""
+        return ("Enter", "list"), JOINS_KEY, ("Esc", "clear")
 
     def on_input_changed(self) -> None:
-        """Search as one types; the best match is chosen."""
+        """Search while typing, and select the best match."""
         if self.query_one("#search", Input).value:
             self.listed.best()
         self.list_again()
 
     def on_input_submitted(self) -> None:
-        """Back to the table."""
+        """Return to the table."""
         self.set_focus(None)
 
     def action_leave(self) -> None:
-        """Out of the search, then out of a selection, then back to Monitor."""
+        """Leave the search, then a selection, then the screen."""
         search = self.query_one("#search", Input)
         if search.has_focus or search.value:
             self.set_focus(None)

@@ -33,21 +33,21 @@ from .parameter_keys import ParameterKeys
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
 
-SKIPPED_KEYS = hint(("Enter or Esc", "close"), ("Up, Down", "scroll"))
+SKIPPED_KEYS = hint(("Enter or Esc", "Close"), ("Up, Down", "Scroll"))
 
 
 class Skipped(KeyQuestion[None]):
-    """A list to read through; scrolls."""
+    """A list that scrolls."""
 
     BINDINGS: ClassVar = [Binding("enter", "no", show=False)]
 
     def __init__(self, staged: int, label: str, left: Sequence[RestoreItem]) -> None:
         super().__init__()
-        self._head = f"{staged} staged from {label}; {len(left)} left out"
+        self._head = f"Staged {staged} from {label}. Skipped {len(left)}."
         self._left = left
 
     def dialog(self) -> ComposeResult:
-        """Each with its reason."""
+        """The number of staged values, and each skipped value with its reason."""
         table = Table.grid(padding=(0, 2, 0, 0))
         for item in self._left:
             table.add_row(
@@ -61,9 +61,9 @@ class Skipped(KeyQuestion[None]):
 
 
 def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbout:
-    """Of which drive it is, and how many settings it has otherwise than the drive holds.
+    """Return the drive of a parameter set, and the number of settings that differ.
 
-    `raws` is what is known of the drive by now: what was not read yet differs from nothing.
+    `raws` holds the values read so far; settings that are not read yet count as equal.
     """
     try:
         values = read_set(path, path.name)
@@ -79,13 +79,16 @@ def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbou
     count = sum(is_setting(profile, profile[code]) for code in different)
     if not known:
         return FileAbout(drive, "not compared")
-    return FileAbout(
-        drive, f"{count} {'differs' if count == 1 else 'differ'}" if count else "equal"
-    )
+    differences = "1 difference" if count == 1 else f"{count} differences"
+    return FileAbout(drive, differences if count else "equal")
+
+
+SAVED_ALL = "Saved: {count} parameters, in {path}"
+SAVED_SOME = "Saved: {count} parameters, without {absent} that the drive does not report, in {path}"
 
 
 class SetKeys(ParameterKeys):
-    """Reads and writes files of parameter sets; what a set has otherwise is staged, not written."""
+    """Reads and writes files of parameter sets; differences of a set are staged, not written."""
 
     # Back up and report
 
@@ -94,7 +97,7 @@ class SetKeys(ParameterKeys):
         from tui.drive.settings.parameter_set import dump_set
         from tui.session.read.upload import setting_codes
 
-        about = "Every setting, in units and raw, one a line (TOML)."
+        about = "Every setting, in units and raw, one per line (TOML)."
         profile = self.session.profile
         self._ask_for_file(
             "Back up to",
@@ -105,7 +108,7 @@ class SetKeys(ParameterKeys):
         )
 
     def action_report(self) -> None:
-        """Ask for a file, read everything, write what a customer may be given."""
+        """Ask for a file, read everything, and write a report for a customer."""
         from tui.session.journal_reading import entries_of
         from tui.session.report import report_text
 
@@ -114,8 +117,8 @@ class SetKeys(ParameterKeys):
             return report_text(self.session.profile, values, entries)
 
         about = (
-            "Identity, line, changed settings, control source, reaction to a lost line, faults and"
-            " writes by Drive Panel (Markdown)."
+            "Identity, line, changed settings, control source, communication loss reaction, faults"
+            " and writes by Drive Panel (Markdown)."
         )
         self._ask_for_file("Report to", "md", about, text, [])
 
@@ -127,7 +130,7 @@ class SetKeys(ParameterKeys):
         text: Callable[[ParameterSet], str],
         codes: list[str],
     ) -> None:
-        """Ask where to; then read these codes, all where there are none, and write the text."""
+        """Ask for a file, read these codes (all if empty), and write the text to it."""
         from ..dialogs.ask import Ask
 
         when = time.strftime("%Y%m%d-%H%M")
@@ -158,11 +161,11 @@ class SetKeys(ParameterKeys):
             # the disk may hang
             await asyncio.to_thread(lambda: write_file(path, text(values)))
         except (LineError, DriveError) as error:
-            self._refuse(f"No file: {error}")
+            self._refuse(f"Not saved: {error}")
         else:
-            bad = len(upload.absent)
-            without = f"; {bad} the drive does not report" if bad else ""
-            self.note(f"Saved: {len(upload.raws)} parameters{without}, in {path}")
+            text_of_result = SAVED_SOME if upload.absent else SAVED_ALL
+            count, absent = len(upload.raws), len(upload.absent)
+            self.note(text_of_result.format(count=count, absent=absent, path=path))
         finally:
             self._tell_reading("")
 
@@ -173,7 +176,7 @@ class SetKeys(ParameterKeys):
     # Compare
 
     def action_load_file(self) -> None:
-        """Choose what to compare with: a file, another drive of the line, the factory settings."""
+        """Choose what to compare with: a file, another drive, or the factory settings."""
         from tui.session.paths import state_folder
 
         from ..dialogs.pick_file import PickFile
@@ -182,7 +185,7 @@ class SetKeys(ParameterKeys):
             if text:
                 self.run_worker(self._compare(text), exclusive=True, group="sets")
 
-        others = [("factory", "the factory settings")]
+        others = [("factory", "factory settings")]
         consoles = self.app.fleet.consoles if self.app.fleet else []
         others += [
             (str(console.device), f"drive {console.device}, {console.session.profile.name}")
@@ -223,7 +226,7 @@ class SetKeys(ParameterKeys):
         from tui.drive.settings.set_file import read_set
 
         path = Path(name)
-        # by its name alone: a long path leaves no room for what is wrong in the file
+        # errors name the file without its folders: a long path leaves no room for the error
         self.editor.source = await asyncio.to_thread(lambda: read_set(path.expanduser(), path.name))
         self.editor.other_label = path.name
 
@@ -244,7 +247,7 @@ class SetKeys(ParameterKeys):
         self.editor.other_label = f"device {device}"
 
     async def _look_at_source(self) -> None:
-        """Read the drive's settings, and show what would be staged and what omitted."""
+        """Read the drive's settings, and report what can be staged and what is skipped."""
         editor = self.editor
         assert editor.source is not None
         self._tell_reading("reading the settings")
@@ -254,17 +257,16 @@ class SetKeys(ParameterKeys):
         if not editor.other:
             editor.other = {"": 0}
         writes, skips = plan.count("write"), plan.count("skip")
-        differ = "difference" if writes == 1 else "differences"
         self.note(
-            f"{editor.other_label}: {writes} {differ} can be staged, {plan.count('equal')}"
-            f" are equal, {skips} skipped.",
+            f"{editor.other_label}: {writes} can be staged, {plan.count('equal')} equal,"
+            f" {skips} skipped.",
             "Press i to stage." if writes else "",
         )
         self.listed.choose(Choice("differs"))
         self.clear_search()
 
     def action_stage_set(self) -> None:
-        """Stage what the set has otherwise; nothing is written."""
+        """Stage the differences of the set; nothing is written."""
         if self.editor.source is None:
             self.note("Nothing to stage from.", "Press Ctrl+O to choose a file or another drive.")
             return
@@ -282,7 +284,7 @@ class SetKeys(ParameterKeys):
         left = [item for item in plan.items_of_kind("skip") if item.reason != "no setting"]
         count = len(plan.edits)
         keys = self.how_to_write("all" if count > 1 else "it") if count else ""
-        self.note(f"{count} staged from {editor.other_label}.", keys)
+        self.note(f"Staged {count} from {editor.other_label}.", keys)
         if left:
             self.app.push_screen(Skipped(len(plan.edits), editor.other_label, left))
 

@@ -10,14 +10,14 @@ from tui.session.settings.editor import Editor
 from .parameter_keys import ParameterKeys
 
 WAITING_NAMED = 3
-"""Codes that wait for a standstill and are named; more are counted."""
+"""Codes that are listed as waiting for standstill; more are counted."""
 
 
 class StageKeys(ParameterKeys):
     """Keys that check and stage typed values; nothing here reaches the drive."""
 
     def action_edit(self) -> None:
-        """A dialog for the parameter under the cursor."""
+        """Open a dialog for the parameter under the cursor."""
         from .edit_value import dialog_for
 
         code = self.listed.code
@@ -31,29 +31,29 @@ class StageKeys(ParameterKeys):
             if answer is not None:
                 self._stage(code, answer)
 
-        # a stop of the drive ends the dialog too: it is about its motor, whatever it stages
+        # a stop of the drive cancels the dialog, too, as it concerns its motor
         now = self.motor_state_text()
         dialog = dialog_for(self.editor, self.session.profile[code], now)()
         self.app.push_screen(dialog, reported)
 
     def _only_teaches(self, code: str) -> bool:
-        """Return True if all that can be done to a parameter is to teach its scale."""
+        """Return True if learning its scale is the only thing possible with a parameter."""
         refused = self.editor.refusal(code)
         read_only = refused is not None and refused.reason == "read-only"
         return read_only and not why_not_taught(self.session.family, code)
 
     def action_teach(self) -> None:
-        """Say what the drive's display shows for the parameter under the cursor."""
+        """Learn the scale of the parameter under the cursor from the drive's display."""
         if self.listed.code:
             self.ask_look(self.listed.code)
 
     def _may_edit(self, code: str) -> bool:
-        """Return True if it may be staged; a motor that runs hinders only the writing."""
+        """Return True if it may be staged; a running motor prevents only writing."""
         refused = self.editor.refusal(code)
         if refused is None or refused.reason == "running":
             if code in self.editor.values.raws:
                 return True
-            self._refuse(self.editor.values.absent.get(code) or f"{code} was not read yet.")
+            self._refuse(self.editor.values.absent.get(code) or f"{code} has not been read yet.")
             return False
         if refused.reason == "unverified":
             self.action_confirm()
@@ -81,28 +81,27 @@ class StageKeys(ParameterKeys):
             self.list_again()
 
     def _tell_staged(self, code: str) -> None:
-        """Report what is staged, and how it is written in the present state."""
+        """Report what is staged, and how to write it in the present state."""
         edit, count = self.editor.staging.edits.get(code), len(self.editor.staging.edits)
         if edit is None:
-            self.note(f"{code} holds that already: not staged.")
+            self.note(f"Not staged: {code} already has this value.")
             return
-        text = f"{code} → {edit.text}: {count} staged."
+        text = f"{code} → {edit.text}. {count} staged."
         if waits := [e.code for e in self.editor.staging.edits if self._waits_for_rest(e.code)]:
             which = ", ".join(waits) if len(waits) <= WAITING_NAMED else f"{len(waits)} of them"
-            wait = "waits" if len(waits) == 1 else "wait"
-            self.note(f"{text} {which} {wait} until the motor is at standstill.")
+            self.note(f"{text} To be written only at standstill: {which}.")
             return
         them = "it" if count == 1 else "both" if count == 2 else f"all {count}"
         running = self.editor.state == "running" and not self.session.arming.hindrance
         how = self.how_to_write(them)
-        self.note(text, f"{how.removesuffix('.')}, with the motor running." if running else how)
+        self.note(text, f"{how} The motor is running." if running else how)
 
     def _waits_for_rest(self, code: str) -> bool:
         refused = self.editor.refusal(code)
         return refused is not None and refused.reason == "running"
 
     def action_step_value(self, steps: int) -> None:
-        """Stage the next value that the drive can hold."""
+        """Stage the value so many steps from the present or staged one."""
         code = self.listed.code
         if not code or not self._may_edit(code):
             return
@@ -110,13 +109,13 @@ class StageKeys(ParameterKeys):
         self._stage(code, (edit.new if edit else self.editor.values.raws[code]) + steps)
 
     def action_confirm(self) -> None:
-        """Confirm an unverified parameter, or keep an edit over another's change."""
+        """Confirm an unverified parameter, or keep an edit although another program wrote."""
         from ..dialogs.confirm import Confirm
 
         code = self.listed.code
         if code in self.editor.staging.changed_elsewhere:
             self.editor.staging.accept_changes()
-            self.note("Your edits stay, against what the drive holds now.")
+            self.note("Your edits are kept. They now apply to the drive's present values.")
             return
         refused = self.editor.refusal(code) if code else None
         if refused is None or refused.reason != "unverified":
@@ -129,24 +128,24 @@ class StageKeys(ParameterKeys):
                 self.look()
 
         follows = (
-            f"No document at hand confirms that {code} is at {parameter.number} on this family."
-            " Read it at the keypad: only if both show the same, confirm it."
-            f" Here it reads {self.editor.values.raws.get(code, 'nothing')}."
+            f"No available document confirms address {parameter.number} of {code} on this family."
+            " Read the value at the keypad. Confirm only if both show the same."
+            f" Raw value read here: {self.editor.values.raws.get(code, 'none')}."
         )
         requested = Confirm(
             f"Confirm {code}?",
             follows,
-            yes="The keypad shows the same",
-            no="Not confirmed",
+            yes="Confirm",
+            no="Cancel",
             loses=True,
             now=self.motor_state_text(),
         )
         self.app.push_screen(requested, reported)
 
     def action_undo(self) -> None:
-        """Take the last edit back; where nothing is staged, stage what was held before a write."""
+        """Undo the last edit; if nothing is staged, stage the values before the last write."""
         staging = self.editor.staging
-        if staged := staging.edits.items:  # what the drive holds anyway is no edit that is seen
+        if staged := staging.edits.items:  # without edits that equal the present value
             self._take_back(staged[-1].code)
         else:
             self.note(staging.stage_old())
@@ -157,10 +156,11 @@ class StageKeys(ParameterKeys):
     def _take_back(self, code: str) -> None:
         staging = self.editor.staging
         staging.undo(code)
-        self.note(f"{code} is no longer staged; {len(staging.edits) or 'nothing'} is staged now.")
+        left = f"{count} still staged." if (count := len(staging.edits)) else "Nothing is staged."
+        self.note(f"{code} is no longer staged. {left}")
 
     def action_undo_this(self) -> None:
-        """Take the edit under the cursor back."""
+        """Undo the edit under the cursor."""
         if self.listed.code in self.editor.staging.edits:
             self._take_back(self.listed.code)
         else:
@@ -168,7 +168,7 @@ class StageKeys(ParameterKeys):
         self.list_again()
 
     def action_undo_all(self) -> None:
-        """Take every edit back, after asking."""
+        """Ask, then undo every edit."""
         from ..dialogs.confirm import Confirm
 
         count = len(self.editor.staging.edits)
@@ -181,8 +181,8 @@ class StageKeys(ParameterKeys):
                 self.editor.staging.undo_all()
                 self.list_again()
 
-        edits = "edit is" if count == 1 else "edits are"
-        follows = f"{count} staged {edits} dropped; the drive is not touched."
+        edits = "1 staged edit" if count == 1 else f"{count} staged edits"
+        follows = f"This discards {edits}. Nothing is written to the drive."
         requested = Confirm(
             "Undo all edits?",
             follows,
@@ -194,16 +194,16 @@ class StageKeys(ParameterKeys):
         self.app.push_screen(requested, reported)
 
     def action_favorite(self) -> None:
-        """Mark or unmark the parameter."""
+        """Add the parameter to the favorites, or remove it."""
         if self.listed.code:
             self.editor.toggle_favorite(self.listed.code)
             self.look()
 
 
 def limit_of_edit(editor: Editor, code: str, answer: str | int) -> str:
-    """Which limit set by another parameter an edit would pass; empty where none.
+    """Return the error if an edit would exceed a limit set by another parameter; else empty.
 
-    Raises ValueRefused where the drive cannot hold it at all.
+    Raises ValueRefused if the drive cannot store the value at all.
     """
     profile, raws, edits = editor.session.profile, editor.values.raws, editor.staging.edits
     if isinstance(answer, str):

@@ -1,4 +1,4 @@
-"""The group Simply start: a first commissioning step by step, as lines; pure functions."""
+"""The group Commissioning: a first commissioning step by step, as lines; pure functions."""
 
 from __future__ import annotations
 
@@ -9,19 +9,18 @@ from tui.widgets.drawing import wrapped
 from .table_view import TableLine
 
 TEXT_WIDTH, TEXT_LINES = 50, 4
-"""Size of the text of a step without parameters: it fits beside the groups of the smallest
-screen."""
+"""Columns and lines of the text of a step without parameters, on the smallest screen."""
 
 GROUNDS_WORDS = {
     "analogy": "as on a sister family",
-    "unverified": "its place from no document",
+    "unverified": "order of steps unverified",
     "practice": "general practice",
 }
-"""Certainty that a step belongs there, if the family's own documents do not state it."""
+"""Source of a step and its place, if the family's own documents do not state it."""
 
 
 def start_up_items(profile: Profile) -> list[TableLine]:
-    """A heading a step, below it its parameters, or what a step without any asks for."""
+    """One heading per step; below it its parameters, or the text of a step without parameters."""
     found: list[TableLine] = []
     for number, step in enumerate(profile.data.start_up, start=1):
         mark = " ?" if step.confidence in UNVERIFIED else ""
@@ -34,7 +33,7 @@ def start_up_items(profile: Profile) -> list[TableLine]:
 
 
 def step_help(profile: Profile, code: str) -> str:
-    """Return the topic of a parameter's step; empty without a step."""
+    """Return the text of a parameter's step; empty without a step."""
     step = next(
         (
             start_up_step

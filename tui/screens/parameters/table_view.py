@@ -29,7 +29,7 @@ STAGED_MARK = 3
 
 @dataclass(frozen=True, slots=True)
 class TableLine:
-    """A line of the table: a parameter, the heading of a group or of a step, or text below it."""
+    """A line of the table: a parameter, the heading of a group or a step, or the text of a step."""
 
     code: str = ""
     group: str = ""
@@ -230,5 +230,5 @@ def _staged(editor: Editor, code: str, width: int) -> Text:
 
 
 def _kept(editor: Editor, code: str) -> str:
-    """Return whether it waits for a reset of the drive, or to be saved in its EEPROM."""
+    """Return R if it waits for a reset of the drive, S if it is not saved to EEPROM, or a blank."""
     return "R" if code in editor.waits_for_reset else "S" if code in editor.unsaved else " "

@@ -1,4 +1,4 @@
-"""Held, staged and possible values of a parameter, as text; pure functions."""
+"""Present, staged and possible values of a parameter, as text; pure functions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ CONFIDENCE_WORDS: dict[Confidence, str] = {
     "analogy": "a sister family",
     "unverified": "none",
 }
-"""Source of the knowledge about a parameter."""
+"""Source of a fact in a profile, in words."""
 
 
 def held_drawn(
@@ -44,7 +44,7 @@ def held_drawn(
 
 
 def value_text(editor: Editor, code: str) -> str:
-    """The held value, with its age if it is old; dashes if there is none."""
+    """The present value, with its age if it is old; dashes if there is none."""
     return held_drawn(
         editor,
         code,
@@ -55,7 +55,7 @@ def value_text(editor: Editor, code: str) -> str:
 
 
 def other_text(editor: Editor, parameter: Parameter) -> str:
-    """The factory value, or that of the set that the drive is compared with."""
+    """The value in the compared set; the factory value without a comparison."""
     if editor.other:
         raw = editor.other.get(parameter.code)
         return "" if raw is None else text_of(editor, parameter, raw)
@@ -63,7 +63,7 @@ def other_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def factory_text(editor: Editor, parameter: Parameter) -> str:
-    """The factory value, with a ? if no document of the family states it; or words for it."""
+    """The factory value, with a ? if no document of the family states it, or a text for it."""
     values = editor.values
     value = factory_value(editor.session.profile, parameter, values.raws, values.lacking)
     if value is None:
@@ -72,7 +72,7 @@ def factory_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def is_changed(editor: Editor, parameter: Parameter) -> bool:
-    """Return True if a setting is not as from the factory."""
+    """Return True if a setting differs from its factory value."""
     values = editor.values
     return not_factory(editor.session.profile, parameter, values.raws, values.lacking)
 
@@ -91,13 +91,13 @@ def old_text(editor: Editor, code: str) -> str:
 def limits_now(
     editor: Editor, parameter: Parameter, *, staged: bool = False
 ) -> LimitsInForce | None:
-    """The present limits, or those after the staged edits."""
+    """The present limits, or with `staged` those after the staged edits."""
     raws = editor.staging.edits.after(editor.values.raws) if staged else editor.values.raws
     return limits_in_force(editor.session.profile, parameter, raws, editor.values.lacking)
 
 
 def range_text(editor: Editor, parameter: Parameter) -> str:
-    """Return its range: the limits in force, or the number of names."""
+    """Return the active limits, or the number of values of an enumeration."""
     if parameter.access == "r" or parameter.bits:
         return ""
     if is_enumeration(parameter):
@@ -107,6 +107,6 @@ def range_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def step_text(editor: Editor, parameter: Parameter) -> str:
-    """Return the value of one step with its unit; empty if it is not a number."""
+    """Return the size of one step with its unit; empty if it is not a number."""
     limits = limits_now(editor, parameter)
     return f"{limits.step:f} {limits.unit}".rstrip() if limits is not None else ""

@@ -38,11 +38,11 @@ OUTCOME_WORDS = {
     EditOutcome.SENT: "sent",
     EditOutcome.WAITS: "not yet written",
 }
-"""Results of an edit in a word; any other was not written."""
+"""Results of an edit in a word; an edit with any other result was not written."""
 
 
 class Results(KeyQuestion[bool | None]):
-    """A list to read through; scrolls. True if what was written is to be saved next."""
+    """A list of results; answers True to save the written values to EEPROM."""
 
     BINDINGS: ClassVar = [
         Binding("enter", "no", show=False),
@@ -50,30 +50,30 @@ class Results(KeyQuestion[bool | None]):
     ]
 
     def __init__(self, applied: Applied, *, staged: bool = False) -> None:
-        """`staged` says whether edits are left: u takes those back first."""
+        """`staged`: edits are left, so u would first undo those."""
         super().__init__()
         self._applied, self._staged = applied, staged
 
     def dialog(self) -> ComposeResult:
-        """Each with its result."""
+        """The number of written edits, and the result of each."""
         with Vertical(id="dialog"):
             yield Plain(results_head(self._applied), id="question")
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
-            keys = [("Enter or Esc", "close")]
+            keys = [("Enter or Esc", "Close")]
             if self._applied.unsaved:
-                keys.append(("S", "save to EEPROM, asks"))
+                keys.append(("S", "Save to EEPROM (asks)"))
             if self._applied.written and not self._staged:
-                keys.append(("u", "afterwards stages the old values"))
+                keys.append(("Esc, then u", "Stage the old values"))
             yield Plain(hint(*keys), id="hint")
 
     def action_save(self) -> None:
-        """Close, and ask whether to save to EEPROM."""
+        """Close, then ask to save to EEPROM."""
         self.answer(True)
 
 
 class RestQuestion(KeyQuestion[bool]):
-    """True if the edits after one that failed are written anyway."""
+    """Asks to write the remaining edits after one that failed."""
 
     NO = False
     by_itself = True
@@ -84,7 +84,7 @@ class RestQuestion(KeyQuestion[bool]):
         self._applied = applied
 
     def dialog(self) -> ComposeResult:
-        """Compose the failures, the edits held back with them, and those still possible."""
+        """The failed edits, the edits that depend on them, and the remaining ones."""
         count = len(self._applied.waits)
         item = count == 1
         with Vertical(id="dialog"):
@@ -97,19 +97,19 @@ class RestQuestion(KeyQuestion[bool]):
             yield Plain(hint(*keys), id="hint")
 
     def action_yes(self) -> None:
-        """Go on with the rest."""
+        """Write the rest."""
         self.answer(True)
 
 
 def results_head(applied: Applied) -> str:
-    """Return how many were written, and how many were not."""
+    """Return the number of edits that were written, and that are still staged."""
     done, failed = len(applied.written), len(applied.results) - len(applied.written)
     head = f"Wrote {done}, all verified" if done else "Nothing written"
-    return f"{head}. {failed} not written, still staged" if failed else head
+    return f"{head}. {failed} still staged." if failed else f"{head}."
 
 
 def results_table(applied: Applied) -> Table:
-    """A line an edit: code, result, old and new value; the reason below it."""
+    """One row per edit: code, result, old and new value; below it, why it was not written."""
     table = Table.grid(padding=(0, 2, 0, 0))
     for result in applied.results:
         edit = result.edit
@@ -132,11 +132,11 @@ def _style(result: Result) -> Style:
 
 
 EDITS_NAMED = 9
-"""Edits that are named; the others are counted."""
+"""Edits that are listed; the others are counted."""
 
 
 def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
-    """Old and new of each edit in the order of writing, then what is dangerous about it."""
+    """Old and new value of each edit in the order of writing, then all warnings."""
     profile, raws = editor.session.profile, editor.values.raws
     chosen = Edits(tuple(edits))
     order = ordered(profile, chosen, raws)
@@ -153,7 +153,7 @@ def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
     reported += [edit.warning for edit in order if edit.warning]
     reported += consequences(profile, chosen, raws, editor.values.lacking)
     reported += [
-        f"{e.code} changes the line itself: the drive answers at its new settings only."
+        f"{e.code} changes the drive's line settings. It then answers only at the new settings."
         for e in order
         if cuts_line(profile, profile[e.code])
     ]
@@ -161,10 +161,10 @@ def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
 
 
 class WriteKeys(ParameterKeys):
-    """Says what follows, and writes it once it is confirmed; the drive must be armed."""
+    """States what follows, and writes after a confirmation; the drive must be armed."""
 
     def action_write(self, *, only: str = "") -> None:
-        """Say what will be written, and write it."""
+        """Ask with the list of writes, then write."""
 
         edits = [e for e in self.editor.staging.edits if not only or e.code == only]
         if not edits:
@@ -177,9 +177,8 @@ class WriteKeys(ParameterKeys):
             self.editor.apply((only,) if only else (), stamp)
 
         many = f"{len(edits)} parameters" if len(edits) > 1 else "1 parameter"
-        yes = "write it, read back" if len(edits) == 1 else "write, each read back"
-        no = "write nothing"
-        self._ask(f"Write {only or many}?", write_text(self.editor, edits), yes, no, work)
+        text = write_text(self.editor, edits)
+        self._ask(f"Write {only or many}?", text, "Write and read back", "Cancel", work)
 
     def action_write_one(self) -> None:
         """Write the edit under the cursor."""
@@ -189,19 +188,24 @@ class WriteKeys(ParameterKeys):
             self.note("This parameter is not staged.")
 
     def action_save_eeprom(self) -> None:
-        """Copy to EEPROM, after saying what happens."""
+        """Ask, then save the settings to EEPROM."""
         from tui.drive.settings.memory_orders import save_order
 
-        self._memory("Save to EEPROM?", save_order, self.editor.save)
+        self._memory("Save to EEPROM?", save_order, "Save", self.editor.save)
 
     def action_factory(self) -> None:
-        """Restore the factory settings, after saying what happens."""
+        """Ask, then restore the factory settings."""
         from tui.drive.settings.memory_orders import factory_order
 
-        self._memory("Restore the factory settings?", factory_order, self.editor.factory)
+        question = "Restore the factory settings?"
+        self._memory(question, factory_order, "Restore", self.editor.factory)
 
     def _memory(
-        self, question: str, order_of: Callable[[Profile], MemoryOrder], work: Callable[[int], None]
+        self,
+        question: str,
+        order_of: Callable[[Profile], MemoryOrder],
+        yes: str,
+        work: Callable[[int], None],
     ) -> None:
         try:
             order = order_of(self.session.profile)
@@ -209,10 +213,10 @@ class WriteKeys(ParameterKeys):
             self._refuse(str(refused))
             return
         if self._require_armed():
-            self._ask(question, order.does, "Continue", "Cancel", work)
+            self._ask(question, order.does, yes, "Cancel", work)
 
     def show_results(self) -> None:
-        """Report once the result of each edit; where one failed, ask before the rest."""
+        """Show once the result of each edit; if one failed, ask before writing the rest."""
         applied = self.editor.applied
         if applied is None or self.editor.busy or self.editor.moved is not None:
             return
@@ -220,7 +224,7 @@ class WriteKeys(ParameterKeys):
         failed = len(applied.results) - len(applied.written)
         if not failed and len(applied.results) < 2:
             self.list_again()
-            return  # the message says it all
+            return  # the message is enough
 
         self.list_again()
         stamp = applied.stamp
@@ -233,13 +237,13 @@ class WriteKeys(ParameterKeys):
             if sure:
                 self.editor.apply(applied.waits, stamp)
             else:
-                self.note(f"{len(applied.waits)} not written; they stay staged.")
+                self.note(f"Canceled. {len(applied.waits)} still staged.")
             self.look()
 
         self.app.push_screen(RestQuestion(applied, self.motor_state_text()), reported)
 
     def offer_to_follow(self) -> None:
-        """Ask once whether to go where the drive answers now."""
+        """Ask once to open the line at the drive's new settings."""
         from ..dialogs.confirm import Confirm
 
         moved = self.editor.moved
@@ -254,11 +258,11 @@ class WriteKeys(ParameterKeys):
             if sure:
                 self.app.follow(moved.line, moved.device)
 
-        # the line is opened anew as this drive wants it: others on it are not asked meanwhile
+        # the line is reopened with this drive's settings: others on it are not polled then
         requested = Confirm(
-            "Follow the drive?",
+            "Open the line at the drive's new settings?",
             moved.text,
-            yes="Follow",
+            yes="Open",
             no="Stay",
             loses=len(self.app.fleet.sessions if self.app.fleet else ()) > 1,
             now=self.motor_state_text(),

@@ -1,4 +1,4 @@
-"""Wiring: warnings, waiting time, pins, rules, addresses, lamps, command words, errata."""
+"""Wiring: warnings, waiting time, pins, rules, addresses, LEDs, command words, errata."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 def trouble_sections(found: Diagnosis | None, wall: float) -> list[PageSection]:
-    """The verdict of N with its steps, measured at this time; none if the drive answers well."""
+    """The diagnosis with its next steps, made at this time; empty if the drive answers well."""
     if found is None or found.well:
         return []
     rows = [PageRow("!", found.text, warns=True)]
@@ -43,7 +43,7 @@ def trouble_sections(found: Diagnosis | None, wall: float) -> list[PageSection]:
 
 
 def wiring_lines(page: Sequence[PageLine]) -> list[Text]:
-    """The lines of a page with their colors: amber where it warns, else grey."""
+    """The lines of a page with their colors: amber for warnings, else gray."""
     return [_line(line) for line in page]
 
 
@@ -63,7 +63,7 @@ def section_tops(page: Sequence[PageLine]) -> list[int]:
 
 
 class WiringScreen(PanelScreen):
-    """A page that scrolls; all that is asked of the drive is its model."""
+    """A page that scrolls; it reads only the model from the drive."""
 
     CSS_PATH = "wiring.tcss"
     BINDINGS: ClassVar = bindings(WIRING)
@@ -76,7 +76,7 @@ class WiringScreen(PanelScreen):
         self._sections = family_page(self._profile)
         self._page: list[PageLine] = []
         self._drawn: tuple[int, float] = (0, 0.0)
-        """Width of the page, and the time of the verdict on it."""
+        """Width of the page, and the time of the diagnosis on it."""
         self._model = ""
         self._top = 0
 
@@ -86,11 +86,11 @@ class WiringScreen(PanelScreen):
         yield Lines(id="page")
 
     def on_mount(self) -> None:
-        """Ask the drive for its model, once."""
+        """Read the drive's model, once."""
         self.run_worker(self._ask_model(), group="model")
 
     def on_screen_resume(self, event: ScreenResume) -> None:
-        """Show the verdict of N, whose dialog has closed."""
+        """Show the result of a diagnosis (N), whose dialog has closed."""
         super().on_screen_resume(event)
         self.call_after_refresh(self.look)
 
@@ -101,13 +101,13 @@ class WiringScreen(PanelScreen):
         try:
             found = await self.console.read(codes)
         except LineError:
-            return  # the strip tells of a line that is lost; the page stands without
+            return  # the status bar shows a lost line; the page works without the model
         raws = {code: reading.raw for code, reading in found.items() if reading.raw is not None}
         self._model = model_read(self._profile, raws)
         self.look()
 
     def draw(self, width: int) -> None:
-        """The page from where the person has scrolled to."""
+        """Show the page from the scroll position on."""
         super().draw(width)
         at = self.console.diagnosed_at
         if (width, at) != self._drawn:
@@ -128,16 +128,16 @@ class WiringScreen(PanelScreen):
         return max(1, self.query_one("#page", Lines).size.height)
 
     def action_scroll(self, lines: int) -> None:
-        """Up or down the page."""
+        """Scroll by so many lines; negative is up."""
         self._top = max(0, self._top + lines)
         self.look()
 
     def action_page(self, pages: int) -> None:
-        """A page of the screen, less a line."""
+        """Scroll by so many screens, less one line each."""
         self.action_scroll(pages * max(1, self._room() - 1))
 
     def action_section(self, step: int) -> None:
-        """To the beginning of the next or the previous section."""
+        """Go to the beginning of the next or the previous section."""
         tops = section_tops(self._page)
         after = [top for top in tops if top > self._top]
         before = [top for top in tops if top < self._top]

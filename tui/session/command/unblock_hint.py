@@ -7,10 +7,15 @@ from collections.abc import Mapping
 from tui.drive.command_blocked import CommandBlocked, UnblockHint
 
 KEYS: Mapping[UnblockHint, str] = {
-    "set-up": "6 opens Control.",
-    "take-control": "t takes the control.",
+    "set-up": "Press 6 for Control.",
+    "take-control": "Press t to take control.",
 }
 """By remedy, the key of the panel."""
+KEYS_OF_PANEL: Mapping[UnblockHint, str] = {
+    "set-up": "In the panel, press 6 for Control.",
+    "take-control": "In the panel, press t on Monitor to take control.",
+}
+"""The same for a text that is read outside the panel."""
 
 
 def way_by_key(held: CommandBlocked) -> str:
@@ -20,7 +25,5 @@ def way_by_key(held: CommandBlocked) -> str:
 
 def block_reason_text(held: CommandBlocked) -> str:
     """Return the reason against a command and its remedy, as used outside the panel too."""
-    key = KEYS.get(held.way, "")
-    return " ".join(
-        part for part in (held.text, held.remedy, f"In the panel {key}" if key else "") if part
-    )
+    parts = (held.text, held.remedy, KEYS_OF_PANEL.get(held.way, ""))
+    return " ".join(part for part in parts if part)

@@ -131,22 +131,22 @@ _OTHER_PORT = (
     " port of the drive, or were reset.",
 )
 _NEVER_ARRIVED = (
-    "The drive did not count 1 frame that was sent: lost on the way to it, or with a damaged"
-    " address. Check its connector, the polarity and the termination.",
-    "The drive did not count {count} frames that were sent: lost on the way to it, or with a"
+    "The drive did not count 1 frame that was sent. It was lost on the way, or arrived with a"
     " damaged address. Check its connector, the polarity and the termination.",
+    "The drive did not count {count} frames that were sent. They were lost on the way, or arrived"
+    " with a damaged address. Check its connector, the polarity and the termination.",
 )
 _DAMAGED_THERE = (
-    "The drive received 1 frame damaged: noise on the way to it. Check the shield, the termination,"
+    "The drive received 1 damaged frame, because of noise. Check the shield, the termination,"
     " the polarization, and motor cables close to the line.",
-    "The drive received {count} frames damaged: noise on the way to it. Check the shield, the"
+    "The drive received {count} damaged frames, because of noise. Check the shield, the"
     " termination, the polarization, and motor cables close to the line.",
 )
 _NOT_ANSWERED = (
-    "The drive received 1 frame whose reply did not arrive: lost or damaged on the way back, or"
-    " later than the timeout.",
-    "The drive received {count} frames whose replies did not arrive: lost or damaged on the way"
-    " back, or later than the timeout.",
+    "The drive received 1 frame whose reply did not arrive. It was lost or damaged on the way back,"
+    " or later than the timeout.",
+    "The drive received {count} frames whose replies did not arrive. They were lost or damaged on"
+    " the way back, or later than the timeout.",
 )
 _FOREIGN = (
     "The drive counted 1 frame more than this program sent: another master polls it, or a gateway"
