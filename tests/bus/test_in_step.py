@@ -425,3 +425,12 @@ async def test_gateway_exception_is_not_a_reply_of_the_drive(code: int, answered
     result = await line.steps.prove(master, job, Read(1, 100, 2))
     assert result.kind is (ResultKind.EXCEPTION if answered else ResultKind.NOTHING)
     assert line.devices[1].ever_answered is answered
+
+
+@pytest.mark.parametrize(("now", "due"), [(4.9, 5.0), (5.0, None), (5.1, None)])
+def test_drain_ends_at_its_time_and_leaves_requests_to_other_rules(
+    now: float, due: float | None
+) -> None:
+    line = _Line()
+    line.steps.quiet_until = 5.0
+    assert line.steps.not_before(Job(Read(1, 100, 1), Priority.POLL, WIDE), now) == due
