@@ -96,7 +96,7 @@ async def test_slots_are_picked_moved_written_and_verified() -> None:
         await message(made, "Wrote NMA2, NMA3, all verified", "Lost at power-off")
         assert [made.drive().raw(f"NMA{n}") for n in (1, 2, 3)] == [3201, 3204, 8604]
         # Parameters was never opened: losses at power-off are still reported
-        await until(made.pilot, lambda: "3 Parameters S" in shown(made.app, "tabs"))
+        await until(made.pilot, lambda: "3▲Parameters" in shown(made.app, "tabs"))
         await made.pilot.press("q")
         await until(made.pilot, lambda: "2 written settings are not saved" in picture(made.app))
         await made.pilot.press("escape")
@@ -309,7 +309,8 @@ async def test_p_names_the_keys_that_write_the_suggestion(
         await until(
             made.pilot, lambda: "Press w to write, u to discard" in shown(made.app, "detail")
         )
-        # on another screen u and w are other keys
+        # on another screen u and w are other keys, and the message stays here
         await made.pilot.press("3")
-        await until(made.pilot, lambda: "Staged" in shown(made.app, "said"))
+        await until(made.pilot, lambda: made.app.place == "parameters")
+        await until(made.pilot, lambda: "Staged" not in shown(made.app, "said"))
         assert "Press" not in shown(made.app, "said")

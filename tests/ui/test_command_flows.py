@@ -469,7 +469,7 @@ def test_number_fields_accept_no_space() -> None:
     }
     assert {name: kinds for name, kinds in fields.items() if kinds} == {
         "parameters/edit_value.py": {"NumberInput"},
-        "connection/line_form.py": {"NumberInput"},
+        "connection/line_form.py": {"NumberInput", "WordField"},
         "choosing.py": {"WordField"},
         "parameters/screen.py": {"WordField"},
         "blocks/pick_parameter.py": {"WordField"},

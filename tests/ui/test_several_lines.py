@@ -148,7 +148,7 @@ async def test_foreign_frames_on_a_hidden_line_are_reported_with_its_name() -> N
 
         await made.until(lambda: reports() == {"", f"{below.opened.label}: "})
         await made.until(lambda: "▲ foreign frames" in made.shown("strip"))
-        assert "1 Line ▲" in made.shown("tabs")
+        assert "1▲Line" in made.shown("tabs")
 
 
 async def test_lost_line_has_no_health() -> None:

@@ -69,7 +69,7 @@ async def test_tour_keys_show_what_the_page_says(
         await until(pilot, lambda: app.connection.drives.option_count == len(demo_drives()))
         app.connection.query_one("#drives", OptionList).focus()
         await pilot.press("down", "down", "down", "enter")
-        await until(pilot, lambda: "MACHINE 4 ▶ FORWARD" in on_screen(app))
+        await until(pilot, lambda: "MACHINE 4·ATV71 ▶ FORWARD" in on_screen(app))
         for keys, texts in steps():
             for key in keys:
                 await pilot.press(key)

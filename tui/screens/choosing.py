@@ -36,8 +36,8 @@ MORE = "Typing also searches the other screens."
 def action_lines(found: Sequence[FoundAction], width: int) -> list[Text]:
     """Return a line for each action: its name, its screen if that is another, its key."""
     keys = max([KEY_WIDTH, *(len(item.action.shown) for item in found)])
-    here = width - keys - 1
-    room = {True: here, False: here - PLACE_WIDTH - 1}
+    here = max(1, width - keys - 1)
+    room = {True: here, False: max(1, here - PLACE_WIDTH - 1)}
     fitted = {
         place: fitted_names(tuple(item.name for item in found if item.here is place), cells)
         for place, cells in room.items()
