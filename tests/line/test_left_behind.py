@@ -128,7 +128,7 @@ def test_panel_asks_if_start_cannot_be_recorded(terminal_with: Start, tmp_path: 
         terminal.press("3", "0")
         terminal.wait_for("30  Hz")
         terminal.answer("Enter")
-        terminal.wait_for("unrecorded?")
+        terminal.wait_for("without a record")
         assert simulation.drive(1).motor.frequency == 0
         terminal.press("Escape")
         terminal.wait_for("was not recorded")
