@@ -43,7 +43,7 @@ def test_line_trouble_is_shown_on_every_screen(
         panel.wait_for(" ".join(meaning.split()[:3]))
         panel.press("Escape")
         panel.press("1")
-        panel.wait_for("1 Line ▲")
+        panel.wait_for("1▲Line")
 
 
 def test_healthy_line_with_two_programs_raises_no_alert(terminal_with: Start) -> None:

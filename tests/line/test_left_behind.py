@@ -45,7 +45,7 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         assert made.speed > 2
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("FORWARD", "Running since", "has exited", "T to take it over")
+        terminal.wait_for("FORWARD", "Running since", "has exited", "T takes it over")
         # not armed: nothing is taken over
         terminal.press("T")
         terminal.wait_for("Not armed")
@@ -106,7 +106,7 @@ def test_motor_left_running_on_purpose_is_reported(
         made.ended()
         time.sleep(3)
         assert made.speed > 2
-        again(second_terminal, made.line).wait_for("Running since", "left running on purpose")
+        again(second_terminal, made.line).wait_for("Running since", "Left running on purpose", "T takes it over")
 
 
 def test_panel_asks_if_start_cannot_be_recorded(terminal_with: Start, tmp_path: object) -> None:
@@ -219,7 +219,7 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
         """The newest message takes more lines for a while; then only the screen says it."""
         wait_until(lambda: text not in terminal.text(), f"{text} goes away")
 
-    shows("Press Space to stop it, T to take it over.", "Open it, then press Space")
+    shows("Space stops it, T takes it over.", "Open it, then press Space")
     terminal.press("6")
     terminal.wait_for("Signal path of the selected configuration")
     shows("Press Space to stop it, or T on Monitor to take it over.")
@@ -232,7 +232,7 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
     terminal.press("q")
     terminal.wait_for("Quit the panel?")
     shows(
-        "Device 1, Altivar 71: runs since",
+        "Device 1, Altivar 71: Running since",
         "Press Space to stop it. To take it over, press Esc, then T",
     )
     terminal.press("Space")

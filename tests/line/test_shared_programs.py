@@ -181,7 +181,7 @@ def test_motor_of_a_frozen_program_is_taken_over_by_a_key(
         panel = terminal_with([sys.executable, "-m", "tui", line, "-d", "1"])
         panel.wait_for("FORWARD")
         runner.process.send_signal(signal.SIGSTOP)
-        panel.wait_for("T to take it over")
+        panel.wait_for("T takes it over")
         panel.press("a")
         wait_until(lambda: "ARMED" in panel.text().replace("NOT ARMED", ""), "it is armed")
         panel.press("T")

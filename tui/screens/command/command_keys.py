@@ -134,7 +134,7 @@ class OrderKeys(TeachKeys):
         """A motor left running by an exited program, and the keys that stop it and take it over."""
         fleet = self.app.fleet
         text = fleet.left_behind(self.console) if fleet is not None else ""
-        return f"{text} Press Space to stop it, T to take it over." if text else ""
+        return f"{text} Space stops it, T takes it over." if text else ""
 
     def action_take_over(self) -> None:
         """Take over a motor left running by an exited program."""
