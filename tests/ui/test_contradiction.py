@@ -27,7 +27,7 @@ async def test_drive_with_a_contradicting_profile_is_not_armed() -> None:
             "Device 1 says it is ATV71HU15M3, Altivar 71: the profile Altivar 312 does not fit it."
         )
         await until(pilot, lambda: any(text.startswith(reported) for text in output(app)))
-        way = "Not armed: the profile is not its own. Type atv71 beside Profile, then s."
+        way = "Cannot be armed: wrong profile. Enter atv71 as Profile, then press s."
         await until(pilot, lambda: way in shown(app, "about"))
         app.connection.drives.focus()
         await pilot.press("enter")
@@ -42,7 +42,7 @@ async def test_drive_with_a_contradicting_profile_is_not_armed() -> None:
         await until(pilot, lambda: app.screen is app.connection)
         field.value = ""
         await pilot.press("s")
-        await until(pilot, lambda: "does not match" not in shown(app, "about"))
+        await until(pilot, lambda: "Cannot be armed" not in shown(app, "about"))
         drive = app.connection.found[1]
         assert drive.session is not None
         assert drive.session.profile.id == "atv71"

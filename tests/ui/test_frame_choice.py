@@ -104,5 +104,5 @@ def test_each_saved_frame_has_a_line_with_its_gap(utc: None) -> None:
         "2026-11-21 11:07:30.500", "490.0", "request", "2 write ACC ← 5.0 s", "",
         "02 06 23 29 00 32 D2 60",
     ]  # fmt: skip
-    assert lines[1].split("\t")[1:4] == ["10.0", "reply", "2 refuses to write: exception 2"]
+    assert lines[1].split("\t")[1:4] == ["10.0", "reply", "2 refuses write: exception 2"]
     assert len(lines) == 2

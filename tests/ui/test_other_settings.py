@@ -98,11 +98,11 @@ async def test_unexpected_reply_tries_other_settings_only_if_confirmed() -> None
 
     with PtyPeer(garbled) as peer:
         async with panel_on(peer.path) as (app, pilot):
-            assert "The address is taken" in output(app)
+            assert "A device has this address." in output(app)
             assert "No drive answered" not in output(app)
             app.connection.action_scan_settings()
             await until(pilot, lambda: isinstance(app.screen, Confirm))
-            assert "Device 2: its reaction when polling stops" in dialog(app)
+            assert "Device 2: its communication loss reaction" in dialog(app)
             await pilot.press("y")
             await until(
                 pilot, lambda: "A device answers, but not clearly, at 19200 8N2" in output(app)
@@ -133,7 +133,7 @@ async def test_drives_are_still_polled_during_the_question() -> None:
             await until(pilot, lambda: set(app.connection.found) == {1, 2})
             app.connection.action_scan_settings()
             await until(pilot, lambda: isinstance(app.screen, Confirm))
-            assert "Device 2: its reaction when polling stops is not" in dialog(app)
+            assert "Device 2: its communication loss reaction is not" in dialog(app)
             before = len(peer.requests)
             for device in (1, 2):
                 await until(pilot, lambda: _requested(peer, device, before) >= 2)  # noqa: B023

@@ -15,7 +15,7 @@ async def test_p_asks_and_pauses_polling_until_the_drive_reacts() -> None:
         await arm(made.pilot)
         await made.pilot.press("P")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
-        assert "It takes about 5 s" in str(made.app.screen.query("#follows").first().render())
+        assert "The test takes about 5 s" in str(made.app.screen.query("#follows").first().render())
         await made.pilot.press("escape")
         await until(made.pilot, lambda: "not tested" in shown(made.app, "now"))
         await made.pilot.press("P")
