@@ -106,7 +106,9 @@ def test_motor_left_running_on_purpose_is_reported(
         made.ended()
         time.sleep(3)
         assert made.speed > 2
-        again(second_terminal, made.line).wait_for("Running since", "Left running on purpose", "T takes it over")
+        again(second_terminal, made.line).wait_for(
+            "Running since", "Left running on purpose", "T takes it over"
+        )
 
 
 def test_panel_asks_if_start_cannot_be_recorded(terminal_with: Start, tmp_path: object) -> None:
