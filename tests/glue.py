@@ -21,21 +21,6 @@ COMPARING = re.compile(
 CONTINUES = re.compile(r" \(?[a-z]+ \S|[,;] \S")
 """Beginning of two words or more that continue a sentence; a single word may be a label."""
 
-LEFT = frozenset(
-    f"tui/screens/{name}.py"
-    for name in (
-        "blocks/pick_parameter",
-        "blocks/view",
-        "connection/found",
-        "connection/line_keys",
-        "frames/frame_list",
-        "monitor/screen",
-        "parameters/detail_view",
-        "parameters/set_keys",
-    )
-)
-"""Modules whose texts are not whole sentences yet."""
-
 
 class Glue(NamedTuple):
     """One glued text with its place."""
@@ -180,8 +165,7 @@ def glued(tree: ast.Module, path: str) -> Iterator[Glue]:
 def all_glued() -> Iterator[Glue]:
     """Yield each glued text of the project."""
     for path in modules():
-        if (name := path.relative_to(ROOT).as_posix()) not in LEFT:
-            yield from glued(tree_of(path), name)
+        yield from glued(tree_of(path), path.relative_to(ROOT).as_posix())
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from tui.drive.blocks.user_words import UserWords
 from tui.drive.blocks.wire_cost import Saving, Stretch, block_request, microseconds, together
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
+from tui.drive.sentences import counted
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.mapping import BlockView, Force, Slot, wire_timing
@@ -222,13 +223,13 @@ def cost_lines(
         text.append("not known: slots not read yet", FAINT)
     else:
         text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
-        text.append(_requests(saving.before.requests), FAINT)
+        text.append(f" {_requests(saving.before.requests)}", FAINT)
         if _waits_for_a_reset(block_editor):
             text.append(" · after a reset", ALARM)
         if block_editor.proposals.plans:
             text.append("  → staged ", FAINT)
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
-            text.append(_requests(saving.after.requests), FAINT)
+            text.append(f" {_requests(saving.after.requests)}", FAINT)
             text.append(f"  ({_ms(-saving.microseconds, sign=True)})", ATTENTION)
         whole = microseconds(profile, wire_timing(block_editor.session), inputs, outputs)
         reported = f"   one exchange {_ms(whole)}"
@@ -247,7 +248,7 @@ def cost_lines(
 
 
 def _requests(count: int) -> str:
-    return " in 1 request" if count == 1 else f" in {count} requests"
+    return counted(count, "in 1 request", "in {count} requests")
 
 
 def _waits_for_a_reset(block_editor: BlockEditor) -> bool:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from tui.drive.plain import plain
+from tui.drive.sentences import any_of
 from tui.widgets.drawing import short, wrapped
 from tui.widgets.palette import ATTENTION, FAINT
 
@@ -49,7 +50,7 @@ def next_step(drive: FoundDrive) -> str:
     if drive.session is None:
         return "It does not identify itself. Enter its profile as Profile, then press s."
     if drive.guessed and others:
-        return f"Assumed profile. If it is {' or '.join(others)}, enter that, then press s."
+        return f"Assumed profile. If it is {any_of(others)}, enter that, then press s."
     return ""
 
 

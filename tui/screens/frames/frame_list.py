@@ -28,7 +28,14 @@ Page = Literal["words", "bytes", "sum"]
 PAGES: tuple[Page, ...] = ("words", "bytes", "sum")
 FEW = 6
 """Frames that are shown on a slow link while they come."""
-FILTER_HINT = "drive, function, error or text, for example 2 read error"
+TITLES = {
+    (False, False): "{heading}",
+    (False, True): "{heading} (paused)",
+    (True, False): "{heading}, filter: {filter}",
+    (True, True): "{heading}, filter: {filter} (paused)",
+}
+"""The heading of the list, by whether it is filtered and whether it is paused."""
+FILTER_HINT = "drive, function, error or text, for example 2-read-error"
 FIND_HINT = "drive, function, error or text; Enter finds the next older frame"
 
 
@@ -123,9 +130,8 @@ class FrameListScreen(PanelScreen):
         self.put("frames", lines + self._lines(frames, shown, columns))
 
     def _title(self) -> str:
-        held = " (paused)" if self._held is not None else ""
-        only = f", filter: {self._filter}" if self._filter else ""
-        return f"{self._heading}{only}{held}"
+        title = TITLES[bool(self._filter), self._held is not None]
+        return title.format(heading=self._heading, filter=self._filter)
 
     @property
     def _kept(self) -> tuple[Frame, ...]:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 LISTING = key_rows(
     ("hold", "h", "pause", "Pause or resume the list."),
     ("other_page", "tab", "view", "Show the next view: values, bytes, counters or summary."),
-    ("only", "O", "filter", "Filter the frames by drive, function or error: 2 read error."),
+    ("only", "O", "filter", "Filter the frames by drive, function or error: 2-read-error."),
     ("find_frame", "j", "", "Find frames by drive, function, error or text."),
     ("scroll(-1)", "up", "", "Show older frames; pauses the list."),
     ("scroll(1)", "down", "", "Show newer frames."),
