@@ -1,4 +1,4 @@
-"""Keys that can do no harm in a burst: they act immediately; all others wait until classified."""
+"""Keys that are harmless in a burst act immediately; all other keys wait until classified."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ TOO_LATE_KEY = "Ignored a key that arrived too late."
 
 
 class HarmlessKeys(Panel):
-    """Decides what the next key can do on the present screen."""
+    """Part of the panel that classifies the next key by its effect on the present screen."""
 
     def __init__(self) -> None:
         super().__init__()
         self._typed = TypeAhead(self, self)
 
     def acts_at_once(self, key: str, character: str | None, *, begins: bool, after: float) -> bool:
-        """Return True if a key can do no harm in a burst; in the thread that reads the keys.
+        """Return True if a key is harmless in a burst. Runs in the thread that reads the keys.
 
         Only the first key of a burst may show another screen. The effect of a key is not known
-        before the key read at the time `after` has taken full effect.
+        before the key read at the time `after` has taken full effect. An error counts as harmful.
         """
         try:
             if self._typed.done_to < after or self.opening.goes_on:
@@ -46,7 +46,7 @@ class HarmlessKeys(Panel):
         screen = self.screen
         if takes_text(self.focused):
             return writes or key in CURSOR_KEYS
-        if takes_text(screen):  # the run line, where arrows step a reference and letters close it
+        if takes_text(screen):  # the run line: arrows step its reference, and letters close it
             return key in EDITS or (character is not None and character.isdecimal())
         if screen.is_modal:
             return key in CURSOR_KEYS

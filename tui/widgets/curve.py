@@ -1,4 +1,4 @@
-"""Curves over time that stay where they are drawn: new values change only the cells at their end.
+"""Curves over time that stay in place: a new value changes only the cells at their end.
 
 The page of time does not scroll. It turns when its end is reached, so few cells change with a
 sample. Pure functions; times are seconds on one clock, values in the unit of the scale.
@@ -24,7 +24,7 @@ Samples = Sequence[tuple[float, float | None]]
 
 
 class PageStep(NamedTuple):
-    """Seconds of a page, of one tick of its axis, and by which it turns."""
+    """Length of a page, interval of its ticks, and shift when it turns, all in seconds."""
 
     span: float
     tick: float
@@ -39,16 +39,16 @@ PAGE_STEPS: Sequence[PageStep] = (
     PageStep(300, 60, 60),
     PageStep(600, 120, 120),
 )
-"""A turn is whole ticks, so the ticks stay in their columns."""
+"""Each turn is a whole number of ticks, so the ticks stay in their columns."""
 
 
 class CurveSigns(NamedTuple):
-    """Characters of a terminal for curves; a cell has `across` x `down` dots."""
+    """Characters that draw curves; a cell has `across` x `down` dots."""
 
     across: int
     down: int
     glyphs: Sequence[str]
-    """By the dots of a cell: those of the left column first, each column from its lowest dot."""
+    """Characters by the dots of a cell as bits: left column first, each from its lowest dot."""
     dotted: Sequence[str]
     """The same for a dotted curve."""
     grid: str
@@ -93,14 +93,14 @@ class CurveScale:
     labels: tuple[float, ...] = ()
 
     def dot(self, value: float, dots: int) -> int:
-        """Return the dot of a value, 0 at the low end; beyond an end the dot of that end."""
+        """Return the dot of a value, 0 at the low end; a value beyond an end has that end's dot."""
         share = (value - self.low) / (self.high - self.low) if self.high > self.low else 0.0
         return round(max(0.0, min(1.0, share)) * (dots - 1))
 
 
 @dataclass(frozen=True, slots=True)
 class Plot:
-    """Place of curves: the page of time, the scale, the cells."""
+    """Area of curves: start and span of its page in seconds, its scale and its cells."""
 
     start: float
     span: float
@@ -126,7 +126,7 @@ class Plot:
 
 
 def page_start(moment: float, step: PageStep) -> float:
-    """Return the start of the page on which a moment is drawn (seconds on the clock of people)."""
+    """Return the start of the page that shows a moment, both in seconds of wall-clock time."""
     return (math.floor(moment / step.turn) + 1) * step.turn - step.span
 
 
@@ -139,7 +139,7 @@ def on_page(samples: Samples, start: float, end: float) -> Samples:
 
 
 def sample_at(samples: Samples, moment: float, reach: float) -> tuple[float, float | None] | None:
-    """Return the last sample before a moment, at most `reach` seconds old; None without one."""
+    """Return the last sample up to a moment, at most `reach` seconds old, or None."""
     at = bisect_right(_Times(samples), moment) - 1
     if at < 0 or moment - samples[at][0] > reach:
         return None
@@ -147,7 +147,7 @@ def sample_at(samples: Samples, moment: float, reach: float) -> tuple[float, flo
 
 
 class _Times(Sequence[float]):
-    """Times of samples, for searching."""
+    """Times of samples for `bisect`, without a copy."""
 
     def __init__(self, samples: Samples) -> None:
         self._samples = samples
@@ -160,7 +160,7 @@ class _Times(Sequence[float]):
 
 
 def dots_of(curve: Curve, plot: Plot, reach: float) -> list[int]:
-    """Return the dots of a curve: by column of dots, a bit for each, the lowest first.
+    """Return the dots of a curve: an integer for each column of dots, bit 0 the lowest dot.
 
     Two values are connected if they are at most `reach` seconds apart and no failed read is
     between them.
@@ -187,7 +187,7 @@ def dots_of(curve: Curve, plot: Plot, reach: float) -> list[int]:
 def _connect(
     columns: list[int], first: tuple[int, int], last: tuple[int, int], *, held: bool
 ) -> None:
-    """Draw a line from dot to dot; a held value is level up to the next."""
+    """Draw a line between two dots into `columns`; a held value stays level up to the next."""
     (x, y), (end, target) = first, last
 
     def level(at: int) -> int:
@@ -203,14 +203,14 @@ def _connect(
     previous = level(begin - 1)
     for at in range(begin, min(end, len(columns) - 1) + 1):
         reached = level(at)
-        # the dot of the column before is drawn there
+        # the previous column already has its own dot
         joint = previous + (reached > previous) - (reached < previous)
         columns[at] |= _between(previous if held else joint, reached)
         previous = reached
 
 
 def _between(first: int, last: int) -> int:
-    """Return the dots from the first to the last."""
+    """Return the bits of all dots between two dots, both included."""
     low, high = min(first, last), max(first, last)
     return (1 << high + 1) - (1 << low)
 
@@ -219,7 +219,7 @@ _EVERY_SECOND = int("01" * 256, 2)
 
 
 def _thinned(dots: int, x: int) -> int:
-    """Leave out every second dot of a level or vertical line."""
+    """Remove every second dot of a level or vertical line."""
     if dots & dots - 1:
         return dots & (_EVERY_SECOND << (x & 1))
     return 0 if x & 1 else dots
@@ -234,10 +234,10 @@ def curve_rows(
     marks: tuple[int, ...] = (),
     cursor: int | None = None,
 ) -> list[Text]:
-    """Return the rows of a plot; in each cell the first of the curves that has a dot there.
+    """Return the rows of a plot; each cell shows the first curve that has a dot there.
 
-    `ticks` are columns of the grid, `marks` columns of vertical lines, `cursor` the column that
-    is read.
+    `ticks` are columns of the grid, `marks` columns of vertical lines, `cursor` the column of
+    the cursor.
     """
     lit: list[dict[int, CurveCell]] = [{} for _ in range(plot.rows)]
     for curve in reversed(curves):
@@ -289,7 +289,7 @@ GRID_EVERY = 3
 def _empty_row(
     signs: CurveSigns, columns: int, ticks: tuple[int, ...], marks: tuple[int, ...], labelled: bool
 ) -> tuple[CurveCell, ...]:
-    """Return a row without a curve: the lines of marks and the grid."""
+    """Return a row without curves: the grid, and the vertical lines of marks."""
     cells = []
     for column in range(columns):
         grid = column % GRID_EVERY == 1 if labelled else column in ticks
@@ -299,13 +299,13 @@ def _empty_row(
 
 
 def _under_cursor(cell: CurveCell, *, is_lit: bool) -> CurveCell:
-    """Return a cell as the cursor shows it, also on a terminal without colors."""
+    """Return a cell under the cursor, which is visible even on a terminal without colors."""
     return (cell[0], cell[1] + CURSOR) if is_lit else ("│", KEY + CURSOR)
 
 
 @lru_cache(maxsize=256)
 def _row(cells: tuple[CurveCell, ...]) -> Text:
-    """Return cells as a text; callers copy it before changing it."""
+    """Return cells as a text. The text is cached: copy it before changing it."""
     text = Text(no_wrap=True)
     for style, run in groupby(cells, key=lambda cell: cell[1]):
         text.append("".join(character for character, _ in run), style)
@@ -316,7 +316,7 @@ ROUND_NUMBERS = (1, 1.2, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10)
 
 
 def round_up(value: float) -> float:
-    """Return the next round number from a positive value on."""
+    """Return the lowest round number not below a positive value; 1.0 for any other value."""
     if value <= 0 or not math.isfinite(value):
         return 1.0
     power = 10.0 ** math.floor(math.log10(value))
@@ -329,7 +329,7 @@ STEPS_MOST = 5
 
 
 def scale_of(low: float, high: float, rows: int) -> CurveScale:
-    """Return the scale from low to high with as many round labels as the rows have room for."""
+    """Return the scale from `low` to `high`, with as many round labels as fit in the rows."""
     span = high - low
     for steps in range(max(1, min(STEPS_MOST, (rows - 1) // 2)), 0, -1):
         step = span / steps

@@ -1,4 +1,4 @@
-"""Advice on Line instead of drives: the event, the next step, the possible drives. Pure."""
+"""Advice shown on Line while it lists no drive: event, next step, families. Pure functions."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN
 
 ERROR_KIND, ALARM_KIND = "error", "alarm"
 ADVICE = 4
-"""Lines at most for what happened, and for what to do next, while no drive is found."""
+"""Maximum rows of the event, and of the next step."""
 FAMILIES = 7
-"""Lines at most for the families that watch the line."""
+"""Maximum rows of the families that react to lost polling."""
 READ_ONLY = "Read-only: nothing is written to a drive, not even a stop."
 ADVICE_INDENT = 3
 
 
 class Advice(NamedTuple):
-    """An event, and the next step."""
+    """Event with the next step; `kind` is error, alarm or empty, and sets the color."""
 
     now: str
     next_step: str
@@ -32,7 +32,11 @@ class Advice(NamedTuple):
 def advice_lines(
     advice: Advice, width: int, *, left: str = "", families: str = "", read_only: bool = False
 ) -> list[Text]:
-    """The lines, a part each; `left` is the time that a search still takes, if one goes on."""
+    """Lay out the advice in `width` columns.
+
+    `left` is the remaining time of a scan as text; empty if it is unknown. An error or alarm hides
+    the families.
+    """
     style = {ERROR_KIND: FAULT, ALARM_KIND: ALARM}.get(advice.kind, PLAIN)
     now = f"{advice.now} {left} left." if left else advice.now
     lines = [Text(""), *_part(now, width, ADVICE, style)]
@@ -65,5 +69,5 @@ HINTS: tuple[tuple[type[Exception], str], ...] = (
 
 
 def hint_for(error: Exception) -> str:
-    """Return what to try next."""
+    """Return the next step after an error."""
     return next((hint for kind, hint in HINTS if isinstance(error, kind)), "Try again.")

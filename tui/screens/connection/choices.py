@@ -1,4 +1,4 @@
-"""Lines on offer: those of this computer and those used lately."""
+"""Lines to choose from: named lines, serial ports, recent lines and simulated ones."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ COUNTED = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight",
 
 
 def line_forms() -> tuple[str, ...]:
-    """Return examples of how a line is written."""
+    """Return an example of each kind of LINE."""
     return (
         "serial:/dev/ttyUSB0,19200,8E1 (and ,timeout=2 for slow drives)",
         "tcp:192.168.0.10:502",
@@ -33,7 +33,10 @@ def line_forms() -> tuple[str, ...]:
 
 @lru_cache(maxsize=1)
 def simulated_lines() -> tuple[tuple[str, str], ...]:
-    """Lines to try without a drive: those of the demo, the fastest alone, and it with another."""
+    """Return simulated lines with descriptions; empty if no profile has a demo drive.
+
+    They have all demo drives, the fastest one alone, and the fastest with the first.
+    """
     shown = demo_drives()
     if not shown:
         return ()
@@ -48,7 +51,7 @@ def simulated_lines() -> tuple[tuple[str, str], ...]:
 
 
 class LineChoice(NamedTuple):
-    """A line that can be opened; `path` where it is a serial port with settings of its own."""
+    """Line to open; `path` is set for a serial port, which gets its settings from the form."""
 
     text: str
     description: str
@@ -56,7 +59,7 @@ class LineChoice(NamedTuple):
     name: str = ""
     """Name in the settings file."""
     device: int | None = None
-    """The drive that is meant by the name."""
+    """Address of the drive that the name includes; None if it names only a line."""
 
 
 ListMark = Literal["", "open", "shown", "fault"]
@@ -66,11 +69,11 @@ LIST_MARKS: dict[ListMark, tuple[str, Style]] = {
     "shown": ("● ", RUNNING),
     "fault": ("■ ", FAULT),
 }
-"""Marks before a line: open, shown, open below with a drive in fault."""
+"""Sign and style by mark; `fault` is an open line in the background with a drive in fault."""
 
 
 class Group(NamedTuple):
-    """Choices under one heading."""
+    """Heading with its choices; `empty` is the note if there are none."""
 
     title: str
     choices: tuple[LineChoice, ...]
@@ -80,7 +83,7 @@ class Group(NamedTuple):
 def groups(
     ports: list[tuple[str, str]], recent: list[str], settings: LineSettings | None = None
 ) -> list[Group]:
-    """The headings with their lines; `ports` are paths with descriptions."""
+    """Return the groups in display order; `ports` are pairs of path and description."""
     serial = tuple(LineChoice(path, description, path) for path, description in ports)
     lately = tuple(LineChoice(text, "") for text in recent if not _offered_simulated(text))
     return [
@@ -92,7 +95,7 @@ def groups(
 
 
 def _named(settings: LineSettings | None) -> list[Group]:
-    """The lines with a name, and that the file that names them has faults; nothing without one."""
+    """Return the group of named lines, with a note if the settings file has errors."""
     if settings is None or not (settings.lines or settings.faults):
         return []
     fault = f"error in {settings.path.name}" if settings.faults else ""
@@ -104,19 +107,19 @@ def _named(settings: LineSettings | None) -> list[Group]:
 
 
 def _without_settings(line: str) -> str:
-    """A line whose adapter's name leaves no room for its settings."""
+    """Drop the settings of a line on an adapter's permanent name, which leaves no room for them."""
     return line.partition(",")[0] if _LASTING.match(line) else line
 
 
 def _offered_simulated(text: str) -> bool:
-    """Return True if it is one of the simulated lines, which are offered anyway."""
-    # by its spelling: what simulates a line takes long to import, and this is the first picture
+    """Return True for a simulated line that the list offers anyway."""
+    # compare spellings: importing the simulator would delay the first screen
     offered = [item for item, _ in simulated_lines()[:2]]
     return text.replace(" ", "").casefold() in (*offered, *map(_with_addresses, offered))
 
 
 def _with_addresses(line: str) -> str:
-    """A simulated line that names no address, with those that its drives have."""
+    """Add addresses, counted from 1, to a simulated line that names none."""
     ids = line.removeprefix("sim:").split(",")
     if "@" in line:
         return line
@@ -124,7 +127,7 @@ def _with_addresses(line: str) -> str:
 
 
 def fault_of_line(text: str) -> str:
-    """Return the error in a typed line or its name, or nothing."""
+    """Return the error text for a typed LINE or name; empty if it is valid."""
     try:
         named = line_named(text.strip())
         check_line(named.line if named else text)
@@ -134,14 +137,14 @@ def fault_of_line(text: str) -> str:
 
 
 def same_line(item: str, other: str) -> bool:
-    """Return True if two texts mean one line with the same settings, however they are spelled."""
+    """Return True if two texts, in any spelling, are the same line with the same settings."""
     if item == other:
         return True
     from tui.bus.link import SerialLink, parse_link
     from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
 
     if len({text.casefold().startswith(SIMULATED_PREFIX) for text in (item, other)}) > 1:
-        return False  # to know more of a simulated line takes the simulator
+        return False  # before line_key, which would import the simulator
     if line_key(item) != line_key(other):
         return False
     try:
@@ -156,7 +159,10 @@ def same_line(item: str, other: str) -> bool:
 
 
 def line_in(text: str, width: int) -> str:
-    """A line in at most so many cells; the end of an adapter's lasting name identifies it."""
+    """Shorten a line to `width` cells.
+
+    An adapter's permanent name keeps its end, which identifies the adapter.
+    """
     found = _LASTING.match(text)
     if found is None or len(text) <= width:
         return short(text, width)
@@ -165,7 +171,7 @@ def line_in(text: str, width: int) -> str:
 
 
 def choice_line(choice: LineChoice, width: int, mark: ListMark = "") -> Text:
-    """A line that can be opened, with as much of its description as there is room for."""
+    """Draw a line with its mark, and with its description if at least 6 cells are free."""
     here = bool(mark)
     sign, style = LIST_MARKS[mark]
     text = Text(sign, style)

@@ -1,4 +1,4 @@
-"""The list of drives on Line: a row for each, the cursor on a drive and not on a place."""
+"""List of the drives on Line; the cursor follows its drive when rows move."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from tui.widgets.plain import entry
 
 
 class DriveList(OptionList):
-    """The drives that answered, one a line; a new state draws its line and moves nothing.
+    """Drives that answered, one per row; a changed state redraws only its row.
 
-    The cursor stays on its drive, whatever comes above it.
+    The cursor stays on its drive when rows are inserted above it.
     """
 
     def update_node_styles(self, animate: bool = True) -> None:
-        """Nothing is styled before it is on a screen: then it is, as a whole."""
+        """Skip styling until the list is attached; Textual then styles it as a whole."""
         if self.is_attached:
             super().update_node_styles(animate)
 
@@ -27,17 +27,20 @@ class DriveList(OptionList):
 
     @property
     def chosen(self) -> int | None:
-        """The device under the cursor."""
+        """Address of the drive under the cursor; None without a cursor."""
         at = self.highlighted
         return None if at is None else int(self.get_option_at_index(at).id or 0)
 
     def point_at(self, device: int) -> None:
-        """Put the cursor on a drive, where it is listed."""
+        """Move the cursor to a drive if it is listed."""
         if device in self._drawn:
             self.highlighted = list(self._drawn).index(device)
 
     def fill(self, lines: Mapping[int, Text], order: Iterable[int], *, sort: bool = True) -> None:
-        """Show these lines in order; without `sort` none changes its place, new ones are last."""
+        """Show the lines of these devices in this order.
+
+        Without `sort`, listed drives keep their order and new ones are added at the end.
+        """
         wanted = list(order)
         if not sort:
             stay = [device for device in self._drawn if device in lines]
@@ -52,7 +55,7 @@ class DriveList(OptionList):
         self.clear_options()
         self.add_options(entry(lines[device], id=str(device)) for device in wanted)
         if chosen is not None and chosen in lines:
-            with self.prevent(OptionList.OptionHighlighted):  # nobody has chosen anything
+            with self.prevent(OptionList.OptionHighlighted):  # the user has chosen nothing
                 self.highlighted = wanted.index(chosen)
         elif lines:
             self.highlighted = 0

@@ -1,4 +1,4 @@
-"""A drive that answered on the line, and what Line says of it."""
+"""Texts on Line about a drive that answered."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
 
 ABOUT, LEFT_LINES = 2, 3
-"""Lines of a drive, and lines at most of a motor that no program commands."""
+"""Rows about a drive, and maximum rows about a motor that no program commands."""
 
 
 def profile_text(drive: FoundDrive) -> str:
-    """The name of its profile, with a sign where it is a guess or wrong; empty without one."""
+    """Return the name of the drive's profile, marked if assumed or wrong; empty without one."""
     if drive.session is None:
         return ""
     if drive.session.contradiction:
@@ -31,7 +31,7 @@ def profile_text(drive: FoundDrive) -> str:
 
 
 def about_drive(drive: FoundDrive) -> str:
-    """Name, vendor, reference, version and profile of a drive, in one line."""
+    """Return address, name, vendor, reference, version and profile of a drive in one line."""
     identity = drive.identity
     version = f"version {identity.version_text}" if identity.version else ""
     maker = f"{identity.vendor} {identity.reference}".strip()
@@ -41,7 +41,7 @@ def about_drive(drive: FoundDrive) -> str:
 
 
 def next_step(drive: FoundDrive) -> str:
-    """Return the next step for a drive whose profile is unknown or wrong; else nothing."""
+    """Return the next step if the profile is unknown, assumed or wrong; else an empty text."""
     if drive.session is not None and drive.session.contradiction:
         own = drive.identity.profile or "its own"
         return f"Cannot be armed: wrong profile. Enter {own} as Profile, then press s."
@@ -55,11 +55,11 @@ def next_step(drive: FoundDrive) -> str:
 
 
 def use_text(line: ModbusLine) -> str:
-    """The share of the line's time that each program has; empty if only this one is on it."""
+    """Return each program's share of the line's time; empty if only this panel uses the line."""
     facts = line.facts
     if not facts.others:
         return ""
-    from tui.bus.program import LONGEST_NAME, readable  # the first picture needs none of it
+    from tui.bus.program import LONGEST_NAME, readable  # imported late: speeds up the start
     from tui.bus.program_use import use_by_program
 
     found = use_by_program(facts.programs, line.counters.programs)
@@ -76,10 +76,9 @@ def use_text(line: ModbusLine) -> str:
 def about_lines(
     drive: FoundDrive | None, left: str, width: int, line: ModbusLine | None = None
 ) -> list[Text]:
-    """The last minute, all that a drive says of itself, and what to do about one that does not.
+    """Return the rows below the lists: line health, the drive, then its next step or line use.
 
-    First of all a motor that no program commands: `left` says who started it. The use of the line
-    is shown if there is nothing to do about the drive.
+    `left` describes a motor that no program commands, and comes first; empty if there is none.
     """
     use = use_text(line) if line is not None else ""
     parts = [about_drive(drive), next_step(drive) or use] if drive else ["", use] if use else []
@@ -92,8 +91,8 @@ def about_lines(
     lines += [Text("")] * (ABOUT - len(lines) - len(first))
     if line is None:
         return [*first, *lines]
-    from .health_view import health_lines  # the first picture needs none of it
+    from .health_view import health_lines  # imported late: speeds up the start
 
-    # above the rest: a long message covers the lowest lines
+    # above the drive: a long notification covers the lowest rows
     device = drive.identity.device if drive else None
     return [*first, *health_lines(line.counters, device, width), *lines]

@@ -1,4 +1,4 @@
-"""The last minute of the open line, and of the drive under the cursor, on Line. Pure functions."""
+"""Health of the line, and of the drive under the cursor, in the last minute. Pure functions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from tui.session.monitor.line_health import LEAST_REPLIES, POOR, SEVERAL_FRAMES,
 from tui.widgets.palette import ALARM, FAINT, PLAIN
 
 ONE_ROW, NARROW = 120, 80
-"""Columns from which line and drive have one row, and below which a figure has no word."""
+"""Minimum columns for line and drive in one row, and for the number of replies."""
 LINE, DRIVE = " Line 60 s ", " Drive {:<4}"
 NO_REPLIES = "no replies"
 
@@ -19,7 +19,10 @@ _STRANGE = ("foreign", "strays")
 
 
 def health_lines(counted: LineCounters, device: int | None, width: int) -> list[Text]:
-    """Good, lost, damaged, foreign and stray: each figure has its place."""
+    """Draw good, lost, damaged, foreign and stray frames, each figure in a fixed column.
+
+    Line and drive share a row from `ONE_ROW` columns; below, there are two rows.
+    """
     beside, cells = width >= ONE_ROW, 5 if NARROW <= width < ONE_ROW else 4
     minute = counted.minute
     line = Text(LINE, FAINT, no_wrap=True)
@@ -28,7 +31,7 @@ def health_lines(counted: LineCounters, device: int | None, width: int) -> list[
     if device is None:
         return [line] if beside else [line, Text("")]
     own = counted.devices.get(device, DeviceCounters()).minute
-    # those missed while it is silent are its own alone
+    # replies missed by a silent drive count for the drive, not for the line
     own = replace(own, lost=own.lost + own.silent, silent=0)
     drive = Text(DRIVE.format(device), FAINT, no_wrap=True)
     _good(drive, own.share, own.replies, "" if beside else _of(own.replies, width))
@@ -66,6 +69,6 @@ def _count_all(text: Text, minute: LastMinute, names: tuple[str, ...], cells: in
 
 
 def _count(number: int, cells: int) -> str:
-    """A count in so many cells, the first of them empty."""
+    """Format a count in `cells` cells, the first one blank; large counts as thousands (k)."""
     short = str(number) if number < 10 ** (cells - 1) else f"{number // 1000}k"
     return f"{short:>{cells}}"

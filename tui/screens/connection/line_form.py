@@ -1,6 +1,7 @@
-"""The fields below the lines: addresses to ask, settings of a serial port, the profile.
+"""Form below the list of lines: serial settings, profile and addresses.
 
-Pure; a test holds that nothing is seen of the change.
+The form is drawn as text first and gets its fields later; a test checks that the switch is
+invisible.
 """
 
 from __future__ import annotations
@@ -27,11 +28,11 @@ FIELD_NAME = Style(color="#85898d")
 FIELD_TEXT = Style(color=TEXT, bgcolor=SURFACE)
 EMPTY = Style(color="#7a7d7f", bgcolor=SURFACE)
 OFF = Style(color="#969a9e", bgcolor="#24272b")
-"""The colors that Textual mixes for a name, a field, the text in an empty one, one that is off."""
+"""Colors that Textual mixes for a name, a value, a placeholder and a disabled field."""
 
 
 def form_lines(rows: Sequence[tuple[str, Sequence[Text]]], width: int) -> list[Text]:
-    """Names with their fields; the last of several fields in a row is a short one."""
+    """Draw names with their fields; in a row, fields after the first have `FORMAT_CELLS` cells."""
     lines = []
     for name, fields in rows:
         line = Text(f" {name:<{FIELD_NAME_CELLS - 1}}", FIELD_NAME, no_wrap=True)
@@ -47,7 +48,7 @@ def form_lines(rows: Sequence[tuple[str, Sequence[Text]]], width: int) -> list[T
 
 
 def drawn_field(value: str, instead: str = "", *, off: bool = False) -> Text:
-    """Return the contents of a field, or the hint in an empty one."""
+    """Draw the value of a field, or the placeholder `instead` if it is empty."""
     if not value:
         return Text(plain(instead), EMPTY)
     return Text(plain(value), OFF if off else FIELD_TEXT)
@@ -59,19 +60,19 @@ FIELD_ROWS = (
     ("Profile", ("profile",)),
     ("Addresses", ("addresses",)),
 )
-"""Names of the rows with the fields in each."""
+"""Name of each row, and the ids of its fields."""
 
 
 class LineForm(Vertical):
-    """Three rows of fields; an empty setting counts as the usual one.
+    """Three rows of fields; an empty serial setting means the default.
 
-    Until `put_fields` they are a picture, though their values count from the start.
+    The fields are only drawn until `put_fields`, but their values apply from the start.
     """
 
     typed = False
-    """True if a person has typed addresses since the last line was opened."""
+    """True if the user has edited the addresses since the last line was opened."""
     _there = False
-    """True if there are fields to type into."""
+    """True once the fields are mounted."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -83,20 +84,20 @@ class LineForm(Vertical):
         }
         self._picture: Lines | None = Lines(fit=self._drawn)
         self._requested: Input | None = None
-        """The field that was asked for before it was there."""
+        """Field to focus once it is mounted."""
 
     def compose(self) -> ComposeResult:
-        """The picture of the fields."""
+        """Yield the drawn form; `put_fields` mounts the fields."""
         if self._picture is not None:
             yield self._picture
 
     def _draw(self) -> None:
-        """Show the values as they are now, while there is a picture only."""
+        """Redraw the current values; does nothing once `put_fields` has run."""
         if self._picture is not None and (width := self.size.width):
             self._picture.show(self._drawn(width))
 
     def _drawn(self, width: int) -> list[Text]:
-        """The fields as they will look."""
+        """Draw the form at this width."""
         return form_lines(
             [(name, [self._drawn_field(field) for field in fields]) for name, fields in FIELD_ROWS],
             width,
@@ -107,7 +108,7 @@ class LineForm(Vertical):
         return drawn_field(field.value, field.placeholder, off=field.disabled)
 
     async def put_fields(self) -> None:
-        """Put the fields in the place of their picture; they are not seen below another screen."""
+        """Replace the drawn form with its fields; does nothing the second time."""
         picture, self._picture = self._picture, None
         if picture is None:
             return
@@ -123,22 +124,22 @@ class LineForm(Vertical):
             self.screen.set_focus(self._requested)
 
     def line_at(self, path: str) -> str:
-        """The LINE of a serial port with these settings."""
+        """Return the LINE of a serial port with the settings in the form."""
         return (
             f"serial:{path},{self._typed('baud') or BAUD},{self._typed('format').upper() or FORMAT}"
         )
 
     @property
     def addresses_text(self) -> str:
-        """The addresses as typed in the field."""
+        """Addresses as typed, not checked."""
         return self._typed("addresses")
 
     def addresses(self) -> list[int]:
-        """The addresses to ask; raises LinkSyntaxError where they are none."""
+        """Parse the addresses to scan. Raises LinkSyntaxError if they are invalid."""
         return parse_addresses(self._fields["addresses"].value)
 
     def offer_addresses(self, text: str) -> None:
-        """The addresses of a line that was opened, unless a person has just typed others."""
+        """Show the addresses of an opened line, unless the user has just edited them."""
         if not self.typed:
             field = self._fields["addresses"]
             with field.prevent(Input.Changed):
@@ -147,21 +148,21 @@ class LineForm(Vertical):
         self.typed = False
 
     def on_input_changed(self, event: Input.Changed) -> None:
-        """Note that a person has typed addresses."""
+        """Note that the user has edited the addresses."""
         if event.input.id == "addresses" and event.input.has_focus:
             self.typed = True
 
     def ask_for_addresses(self) -> None:
-        """Into the field of the addresses, at once: what is typed next belongs there."""
+        """Focus the addresses field at once, or as soon as it is mounted."""
         self._enter("addresses")
 
     @property
     def profile(self) -> str:
-        """The profile that was typed, or nothing."""
+        """The typed profile in lower case; empty if there is none."""
         return self._typed("profile").lower()
 
     def ask_for_profile(self) -> None:
-        """Into the field of the profile, at once: what is typed next belongs there."""
+        """Focus the profile field at once, or as soon as it is mounted."""
         self._enter("profile")
 
     def _enter(self, name: str) -> None:
@@ -170,13 +171,13 @@ class LineForm(Vertical):
             self.screen.set_focus(self._requested)
 
     def offer_settings(self, port: bool) -> None:
-        """Only a serial port has settings that are chosen here."""
+        """Enable baud and format for a serial port; disable them for other lines."""
         for name in ("baud", "format"):
             self._fields[name].disabled = not port
         self._draw()
 
     def show_settings(self, baud: int, format: str) -> None:
-        """The settings at which drives answered are in their fields."""
+        """Show the settings at which drives answered."""
         for name, value in (("baud", str(baud)), ("format", format)):
             field = self._fields[name]
             with field.prevent(Input.Changed):

@@ -25,22 +25,22 @@ OPEN_AND_SCANNED = "{line} is open, with a scan in progress."
 
 
 class LineKeys(Scanning):
-    """A line that was opened is searched for drives at once."""
+    """Opens and closes lines; scans a line as soon as it is open."""
 
     refused: tuple[str, LineError] | None = None
-    """The line that could not be opened when that was tried last, and why."""
+    """Line that could not be opened at the last attempt, with the error; None if it opened."""
 
     def action_refresh_lines(self) -> None:
-        """Look for serial ports and recent lines."""
+        """Find the serial ports and recent lines again."""
         self.lines.look_for_lines()
         self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
 
     def line_of(self, choice: LineChoice) -> str:
-        """The line of a choice, with the settings of the form where it is a port."""
+        """Return the LINE of a choice; a serial port gets the settings in the form."""
         return self.form.line_at(choice.path) if choice.path else choice.text
 
     def action_type_line(self) -> None:
-        """Type a line."""
+        """Ask for a LINE or a name, and open it."""
         from ..dialogs.ask import Ask
 
         def typed(text: str | None) -> None:
@@ -55,12 +55,12 @@ class LineKeys(Scanning):
         self.app.push_screen(dialog, typed)
 
     def open_line(self, text: str, device: int | None = None) -> None:
-        """Open a line and ask for its drives; a good one is not left for it without asking.
+        """Open a line and scan it; ask first if that closes an open line or ends a scan.
 
-        With `device` that drive alone is asked for.
+        With `device`, scan only that address. While another line is being opened, only report that.
         """
         opening = self.app.opening
-        if opening.goes_on:  # by the mouse: keys do not get here
+        if opening.goes_on:  # a mouse click: keys are blocked while a line opens
             self.app.tell(f"{opening.text} is being opened. Press Esc to cancel.")
         else:
             opening.begin(text, self._ask_to_open(text, device))
@@ -78,20 +78,23 @@ class LineKeys(Scanning):
             self._show(here, device)
             return
         if here is not None:
-            self.app.show_line(here)  # with other settings: it is closed for them
+            self.app.show_line(here)  # it must be closed, as its settings differ
             self.look()
         if here is None and self.found:
-            self._open_next(text, device, beside=True)  # a line with drives goes on below
+            self._open_next(text, device, beside=True)  # the line with drives stays open
             return
         asks = here is not None or self.scanning
         always = f"{self._what_is_here()} It is closed, and {text} is opened." if asks else ""
         question = "Close this line and open the other?"
         if await self.app.may_let_go(question, yes="Close", no="Cancel", always=always):
-            # drives may have answered while that was asked
+            # drives may have answered while the question was open
             self._open_next(text, device, beside=here is None and bool(self.found))
 
     def _show(self, here: PanelLine, device: int | None) -> None:
-        """Show a line that is open, and look for its drives again where it was shown already."""
+        """Show an open line.
+
+        If it is already shown, scan it again. Reopen it if it is lost or has no drives.
+        """
         if here.opened is self.app.opened:
             if self._is_good():
                 self._tell_open()
@@ -105,7 +108,7 @@ class LineKeys(Scanning):
         self.look()
 
     def _open_next(self, text: str, device: int | None, *, beside: bool) -> None:
-        """Open a line `beside` those that are open, which go on below, or instead of this one."""
+        """Open a line; without `beside`, it replaces the shown one."""
         self.app.opening.begin(text, self._open_now(text, device, beside=beside))
 
     @work(exclusive=True, group="line", exit_on_error=False)
@@ -122,7 +125,7 @@ class LineKeys(Scanning):
             self.app.opening.end(get_current_worker())
 
     def _search_for(self, device: int | None) -> None:
-        """Search the line that was opened for its drives, or for one."""
+        """Scan the opened line, or only one address."""
         if device is None:
             self.action_scan()
         else:
@@ -130,17 +133,16 @@ class LineKeys(Scanning):
             self.scan([device])
 
     def tell_opening(self, text: str) -> None:
-        """Show the progress until the line is open."""
+        """Show that a line is being opened, and the key that cancels this."""
         self.advise(f"Opening {text}", "Press Esc to cancel. Other keys are ignored.")
         self.draw_stop_keys()
 
     def _is_good(self) -> bool:
-        """Return True if the open line is one with drives, or one on which they are searched
-        for."""
+        """Return True if the line is connected, and has drives or a running scan."""
         return self._connected() and (bool(self.found) or self.scanning)
 
     def is_on_open_line(self) -> bool:
-        """Return True if the cursor is on the line that is open."""
+        """Return True if the cursor is on the shown line, with the same settings."""
         chosen, here = self.lines.chosen, self.app.line_text
         return chosen is not None and bool(here) and same_line(self.line_of(chosen), here)
 
@@ -153,14 +155,14 @@ class LineKeys(Scanning):
         return text.format(line=self.app.line_label, count=count)
 
     def _tell_open(self) -> None:
-        """Enter on the line that is open looks for its drives, unless that goes on."""
+        """Scan the shown line, or report that it is being scanned."""
         if self.scanning:
             self.app.tell("This line is open and being scanned. Press Esc to end the scan.")
         else:
             self.action_scan()
 
     def start(self, text: str, device: int | None) -> None:
-        """Open a line; with a device, watch that drive as soon as it is known."""
+        """Open a line; with `device`, show Monitor on that drive as soon as it answers."""
         self.app.opening.begin(text, self._start(text, device))
 
     @work(exclusive=True, group="line", exit_on_error=False)
@@ -175,7 +177,7 @@ class LineKeys(Scanning):
                 return
             search = self.scan([device])
             self.app.opening.end(work)
-            with suppress(WorkerError):  # ended by a key, or told where it failed
+            with suppress(WorkerError):  # ended by a key, or already reported
                 await search.wait()
                 if device in self.found:
                     await self.open_drive(device).wait()
@@ -184,13 +186,13 @@ class LineKeys(Scanning):
             leave_opening(self.app)
 
     async def _opens(self, text: str) -> bool:
-        """Open a line; False if it cannot be opened, with the reason shown."""
+        """Open a line; if that fails, show the error and return False."""
         self.end_search()
         self.tell_opening(text)
         try:
             await self.app.connect(text)
         except LinkSyntaxError as error:
-            self.lines.forget_named()  # nothing that could be opened, now or later
+            self.lines.forget_named()  # invalid: it can never be opened
             self.fail(error)
             return False
         except (LineError, DriveError) as error:
@@ -202,14 +204,17 @@ class LineKeys(Scanning):
         self._led = False
         self.action_refresh_lines()
         chosen = self.lines.chosen
-        if chosen is None or not chosen.path:  # a port stays the port that it is
+        if chosen is None or not chosen.path:  # the cursor stays on a port
             self.lines.offer(self.app.line_text)
         self.form.offer_addresses(await asyncio.to_thread(self._addresses_here))
         self.look()
         return True
 
     def _addresses_here(self) -> str:
-        """The addresses that were asked here last, or those that a simulated line has."""
+        """Return the addresses of the last scan of this line; reads files.
+
+        Without any, return the addresses of a simulated line, else the default.
+        """
         from tui.session.connect.addresses import addresses_text
         from tui.session.connect.line_key import line_key
         from tui.session.paths import address_text
@@ -219,14 +224,14 @@ class LineKeys(Scanning):
         return address_text(line_key(self.app.line_text)) or known or ADDRESSES
 
     def _point_at(self, text: str) -> None:
-        """The cursor on a line; it stays where that is meant already, however it is spelled."""
+        """Move the cursor to a line, unless it is already on that line in another spelling."""
         chosen = self.lines.chosen
         if chosen is None or not same_line(self.line_of(chosen), text):
             self.lines.offer(text)
 
     @work(exclusive=True, group="line", exit_on_error=False)
     async def action_disconnect(self) -> None:
-        """Close the line; where that trips a running drive, only after saying so."""
+        """Close the line; ask first if a drive reacts to lost polling."""
         if not await self.app.may_let_go("Close the line?", yes="Close", no="Cancel"):
             return
         self.forget_drives()

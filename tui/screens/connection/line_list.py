@@ -1,4 +1,4 @@
-"""The list of lines on Line: serial ports, those used lately, simulated ones."""
+"""List of lines on Line: named lines, serial ports, recent lines and simulated ones."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from .choices import Group, LineChoice, ListMark, choice_line, groups
 
 
 class LineList(OptionList):
-    """Lines under headings; drawn again only when they or its width have changed."""
+    """Lines under headings; redrawn only if lines, marks or width have changed."""
 
     def update_node_styles(self, animate: bool = True) -> None:
-        """Nothing is styled before it is on a screen: then it is, as a whole."""
+        """Skip styling until the list is attached; Textual then styles it as a whole."""
         if self.is_attached:
             super().update_node_styles(animate)
 
@@ -33,16 +33,16 @@ class LineList(OptionList):
             None
         )
         self._here = ""
-        """The key of the line that is shown."""
+        """Key of the shown line; empty if there is none."""
         self._open: frozenset[str] = frozenset()
-        """Those of all lines that are open."""
+        """Keys of all open lines."""
         self._faulty: frozenset[str] = frozenset()
-        """Those of the open lines with a drive in fault."""
+        """Keys of the open lines with a drive in fault."""
         self._named = ""
-        """A line that somebody has named: it may be none of those used lately."""
+        """Line added by `offer`, even if it is not a recent one; empty if there is none."""
 
     def look_for_lines(self) -> None:
-        """Find the serial ports there are now, and the lines used lately."""
+        """Find the current serial ports and recent lines; reads files. `fill` shows them."""
         from tui.session.connect.open_line import serial_ports
 
         lately = recent_lines()
@@ -53,17 +53,17 @@ class LineList(OptionList):
         self._groups = groups(serial_ports(), recent, settings)
 
     def choice(self, id: str | None) -> LineChoice | None:
-        """The line of an option; None for a heading."""
+        """Return the line of an option; None for a heading."""
         return self._choices.get(id or "")
 
     @property
     def chosen(self) -> LineChoice | None:
-        """The line under the cursor."""
+        """The line under the cursor; None without a cursor."""
         at = self.highlighted
         return None if at is None else self.choice(self.get_option_at_index(at).id)
 
     def offer(self, text: str) -> None:
-        """Put the cursor on a line that was named, so that Enter means no other."""
+        """List a line and move the cursor to it, so that Enter opens this line."""
         from tui.session.connect.known_lines import remembered_text
 
         self._named = text = remembered_text(text)
@@ -74,13 +74,13 @@ class LineList(OptionList):
             self.highlighted = self.get_option_index(fits[0])
 
     def forget_named(self) -> None:
-        """Show that no line was named."""
+        """Remove the line that `offer` added."""
         self._named = ""
         self.look_for_lines()
         self._fill()
 
     def fill(self, shown: str, opened: Sequence[str], faulty: Sequence[str] = ()) -> None:
-        """Show what was found; which lines are open, shown, in fault. The cursor stays."""
+        """Draw the list, with marks for lines open, shown, in fault; the cursor stays."""
         self._faulty = frozenset(_key(text) for text in faulty)
         self._here = _key(shown) if shown else ""
         self._open = frozenset(_key(text) for text in opened if text)
@@ -102,7 +102,7 @@ class LineList(OptionList):
         self.highlighted = self.get_option_index(chosen) if still and chosen else first
 
     def _rows(self, group: Group, width: int) -> list[Option]:
-        """A heading with its lines, or with what is said of none."""
+        """Return the options of a group: its heading, its lines, and its note if that applies."""
         found = [entry(Text(f" {group.title}", FAINT), disabled=True)]
         for choice in group.choices:
             key = f"{group.title} {choice.name} {choice.text}"
@@ -121,8 +121,10 @@ class LineList(OptionList):
         return "fault" if line in self._faulty else "open"
 
     def _may_be_open(self, text: str) -> bool:
-        """Return True if a line has to be looked at closer; to know simulated ones takes the
-        simulator."""
+        """Return True if an open line is of the same kind: simulated, or real.
+
+        Only then compute the key, which imports the simulator for a simulated line.
+        """
         if not self._open:
             return False
         from tui.session.connect.line_key import SIMULATED_PREFIX
@@ -132,12 +134,12 @@ class LineList(OptionList):
 
 
 def list_width(width: int) -> int:
-    """The width that the styles give the list on a terminal of so many columns."""
+    """Return the columns that the style sheet gives the list on a terminal of `width` columns."""
     return max(22, min(32, width * 32 // 100))
 
 
 def _key(text: str) -> str:
-    """Which line is meant; asked while one is open only: what a line is made of is there then."""
+    """Return the key of a line; called only while a line is open, as the import is slow before."""
     from tui.session.connect.line_key import line_key
 
     return line_key(text)

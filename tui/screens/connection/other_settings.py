@@ -1,4 +1,4 @@
-"""The search at other baud rates and formats, where nobody answers at those of the line."""
+"""Scan at other baud rates and formats, if no drive answers at those of the line."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ DAMAGED_ANSWERS = "A device answers at {setting}, but its identification is dama
 
 
 class OtherSettings(LineKeys):
-    """Tries one setting after the other until a drive answers; the line stays there."""
+    """Tries one setting after another until a drive answers; the line keeps that setting."""
 
     _settings_tried: frozenset[LineSetting] = frozenset()
-    """Those of the search before, which the next one leaves out."""
+    """Settings already tried; the next scan skips them until none is left."""
 
     @work(exclusive=True, group="line", exit_on_error=False)
     async def action_scan_settings(self) -> None:
-        """Search at every setting that drives can have, likely ones first.
+        """Scan at every setting that a family can have, likely ones first.
 
-        It ends at the first at which a drive answers, and goes on from there when it is asked for
-        once more. No drive that would act is left alone for it unasked.
+        Ends at the first setting with an answer; the next call continues with the remaining ones.
+        Asks first if a device has answered, because its polling stops.
         """
         if (link := self._port()) is None:
             return
@@ -55,7 +55,7 @@ class OtherSettings(LineKeys):
             await self._try(link, devices, settings, costs)
 
     def _who_is_unclear(self) -> str:
-        """Of addresses whose answers were no replies: what leaves them alone; empty without any."""
+        """Warn of devices that answered without a valid identification; empty if there are none."""
         from tui.session.connect.addresses import addresses_text
 
         answered = self.search.answered if self.search is not None else frozenset()
@@ -65,7 +65,7 @@ class OtherSettings(LineKeys):
         return f"A device answered at {who}. Its communication loss reaction is not known."
 
     def _port(self) -> SerialLink | None:
-        """The port that is open for the panel alone; else it is said why nothing is tried."""
+        """Return the serial port if only this panel uses it; else show why no setting is tried."""
         from tui.bus.link import SerialLink
 
         opened = self.app.opened
@@ -85,7 +85,10 @@ class OtherSettings(LineKeys):
         return None
 
     def _worth_a_try(self, link: SerialLink) -> list[LineSetting]:
-        """The settings that are left, likely ones first; all of them where none is left."""
+        """Return the untried settings, likely ones first; reads files.
+
+        If none is left, start over with all but the current one.
+        """
         from tui.bus.transport.ports import is_pseudo_terminal
         from tui.drive.finding import LineSetting
         from tui.session.connect.address_prober import settings_worth_a_try
@@ -101,7 +104,7 @@ class OtherSettings(LineKeys):
     def _costs(
         self, link: SerialLink, settings: Sequence[LineSetting], addresses: int
     ) -> ScanEstimate:
-        """Return the duration of the settings; reads files."""
+        """Estimate the duration of a scan at these settings; reads files."""
         from tui.session.connect.scan_estimate import scan_estimate
 
         opened = self.app.opened
@@ -109,7 +112,7 @@ class OtherSettings(LineKeys):
         return scan_estimate(link, wait, settings, addresses)
 
     def _tell_slow(self, settings: Sequence[LineSetting], costs: ScanEstimate) -> None:
-        """Before the first of the slow settings: how long they take, and who can have them."""
+        """Report how long the slow settings take, and which families can have them."""
         self.app.events.add("told", costs.before_slow(settings, "Esc"))
 
     async def _try(
@@ -119,7 +122,7 @@ class OtherSettings(LineKeys):
         settings: Sequence[LineSetting],
         costs: ScanEstimate,
     ) -> None:
-        """Search at each setting until somebody answers."""
+        """Scan at each setting until a device answers; skip settings that the port refuses."""
         self.forget_drives()
         for number, setting in enumerate(settings, start=1):
             text = f"serial:{link.path},{setting.baud},{setting.format}"
@@ -146,7 +149,7 @@ class OtherSettings(LineKeys):
                 self.fail(error)
                 return
             if self.search is None or self.search.ended != "done":
-                return  # told where it failed
+                return  # the scan has reported why it ended
             self._settings_tried |= {setting}
             if self.found or self.search.answered:
                 self._stay_at(text, setting)
@@ -158,7 +161,7 @@ class OtherSettings(LineKeys):
         )
 
     def _stay_at(self, text: str, setting: LineSetting) -> None:
-        """Drives answered: the line stays as it is, and is remembered so."""
+        """Keep the line at the setting at which a device answered, and store it as recent."""
         from tui.session.connect.known_lines import remembered_text
         from tui.session.paths import remember_line
 

@@ -1,4 +1,4 @@
-"""Registration of Line: what the panel lists, and the keys."""
+"""Registration of Line: its title, actions and keys."""
 
 from __future__ import annotations
 

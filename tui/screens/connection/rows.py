@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from tui.session.shown import Shown
 
 TRUSTED_LOOKS = 3
-"""Looks after which a value is no longer taken for the present one."""
+"""Number of check periods after which a value no longer counts as current."""
 
 VAIN: Mapping[str, tuple[str, str]] = {
     "silent": ("no answer", "lost"),
@@ -27,14 +27,14 @@ VAIN: Mapping[str, tuple[str, str]] = {
     "swapped": ("bytes swapped", "bytes swapped"),
     "not_polled": ("not polled", "not polled"),
 }
-"""Words for a look in vain: at first, and once nothing is current any more."""
+"""Words for a failed check: while the values are current, and once they are too old."""
 
 Seen = tuple["DriveState | None", Mapping[str, "Shown"], float | None, bool, "Contact"]
-"""State, readings, their age in s, whether that is too old, the result of the last look."""
+"""State, readings, their age in s, True if that is too old, result of the last check."""
 
 
 def rows_of(fleet: Fleet, now: float, *, connected: bool) -> dict[int, WallRow]:
-    """A row for each drive that was found, by device; `now` on the line's clock."""
+    """Return a row for each drive found, by device; `now` is on the line's clock."""
     looks, period = fleet.line_watch.looks, fleet.line_watch.glance_period
     return {
         device: _row(drive, fleet, looks.get(device), (now, period), connected)
@@ -70,13 +70,16 @@ def _row(
         current=_figure(console, readings, "motor_current")[0],
         current_unit=_figure(console, readings, "motor_current")[1],
         share=_share(console, readings),
-        age=None if age is None else float(int(age)),  # a row is drawn when it changes
+        age=None if age is None else float(int(age)),  # whole seconds: fewer redraws
         old=old,
     )
 
 
 def _seen(console: DriveConsole, look: Look | None, now: float, period: float) -> Seen:
-    """The newest of what was seen, and what was seen before where that brought nothing."""
+    """Return the newest values, from monitor or check; if the check failed, those before it.
+
+    `now` and `period` are in seconds.
+    """
     snapshot = console.latest
     if snapshot is not None and (look is None or snapshot.time >= look.time):
         heard = max((reading.time for reading in snapshot.readings.values()), default=None)
@@ -95,15 +98,15 @@ def _seen(console: DriveConsole, look: Look | None, now: float, period: float) -
 
 
 def _called(state: DriveState | None, words: str) -> str:
-    """The words of the strip, quieter; a fault with as much of its name as there is room for."""
+    """Return the state of the status bar in lower case; a fault by its code and name."""
     if state is not None and state.kind == "fault" and state.fault is not None:
         return f"{state.fault.code} {state.fault.name.lower()}".strip()
     return words.lower()
 
 
 def _figure(console: DriveConsole, readings: Mapping[str, Shown], quantity: str) -> tuple[str, str]:
-    """Text and unit of a value; with a sign where nobody has confirmed it for this family."""
-    from tui.drive.profile.profile import is_verified  # the first picture needs none of it
+    """Return text and unit of a value; `?` marks a parameter not verified for this family."""
+    from tui.drive.profile.profile import is_verified  # imported late: speeds up the start
 
     text, unit = value_cell(console, readings, quantity)
     parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
@@ -112,7 +115,7 @@ def _figure(console: DriveConsole, readings: Mapping[str, Shown], quantity: str)
 
 
 def _share(console: DriveConsole, readings: Mapping[str, Shown]) -> float | None:
-    from tui.session.monitor.load import share_of_limit  # what a line is made of
+    from tui.session.monitor.load import share_of_limit  # imported late: speeds up the start
 
     parameter = console.session.profile.quantity("motor_current")
     return share_of_limit(console.session, readings.get(parameter.code) if parameter else None)

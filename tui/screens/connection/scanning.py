@@ -1,4 +1,4 @@
-"""The search for drives on the open line, which goes on below other screens; opening one."""
+"""Scan of the open line, which continues below other screens, and opening of a drive."""
 
 from __future__ import annotations
 
@@ -31,17 +31,17 @@ AFTER_NO_ANSWER = (
 
 
 class Scanning(LineView):
-    """Asks each address; a drive that answers gets its profile and is looked after."""
+    """Probes each address; a drive that answers gets its profile and is kept alive."""
 
     _led = False
+    """True if this scan has moved the cursor to the drives."""
     unclear: frozenset[int] = frozenset()
     """Addresses whose last identification was damaged: no drive is known to answer there."""
-    """True if the cursor was led to the drives of the open line."""
 
     def action_scan(self) -> bool:
-        """Search for drives at the addresses given; those that were found stay.
+        """Scan the addresses in the form; drives already found stay.
 
-        False without a line, or with invalid addresses: then it says so.
+        If no line is open or the addresses are invalid, show that and return False.
         """
         if self.app.fleet is None:
             self.say("No line is open.", "Choose one and press Enter.", ALARM_KIND)
@@ -57,10 +57,10 @@ class Scanning(LineView):
 
     @work(exclusive=True, group="scan", exit_on_error=False)
     async def scan(self, devices: Sequence[int], typed: str = "", *, once: bool = False) -> None:
-        """Ask each address; drives appear as they answer, whatever screen is on top.
+        """Probe each address; drives appear as they answer, also below another screen.
 
-        `typed` is remembered as the addresses of this line. A search made `once` is one of several
-        settings: the caller that tries them reports the result.
+        `typed` is stored as the addresses of this line. With `once`, silent addresses are not
+        retried, and the caller reports the result.
         """
         from tui.session.connect.other_masters import MasterDetector, OtherMaster
         from tui.session.connect.search import Search
@@ -100,11 +100,13 @@ class Scanning(LineView):
         self.look()
 
     async def _is_not_alone(self, search: Search) -> bool:
-        """Return True if another master was heard before a search for unknown drives; that ends
-        it."""
+        """Listen before a scan for unknown drives; end the scan if another master is heard.
+
+        Return True if the scan has ended.
+        """
         if self.app.fleet is None:
             return False
-        heard = True  # also where a key ends it meanwhile
+        heard = True  # stays True if a key cancels listening
         try:
             heard = await self.hears_another_master(self.app.fleet.line.link)
         finally:
@@ -115,9 +117,9 @@ class Scanning(LineView):
         return heard
 
     async def name_families(self, *, wanted: bool = True) -> None:
-        """Before the first request: possible drives that react to lost polling.
+        """Show, before the first request, the families that react to lost polling.
 
-        Not where they are known drives, or those of a simulation in this very program.
+        Shows none for known drives or for drives simulated in this process.
         """
         opened = self.app.opened
         if not wanted or opened is None or opened.simulation is not None:
@@ -127,8 +129,10 @@ class Scanning(LineView):
         self.look()
 
     async def hears_another_master(self, link: Link) -> bool:
-        """Listen on a port before anything is sent; another master is reported, with its
-        requests."""
+        """Listen on a serial port before anything is sent; report another master and its requests.
+
+        Return True if one was heard. Other links and shared lines are not monitored.
+        """
         from tui.bus.link import SerialLink
         from tui.session.connect import other_masters
 
@@ -136,7 +140,7 @@ class Scanning(LineView):
         if opened is None or opened.simulation is not None or not other_masters.LISTEN:
             return False
         if not isinstance(link, SerialLink) or opened.line.facts.others:
-            return False  # nobody else is heard there, or programs of ours are
+            return False  # nothing to hear, or only other programs of Drive Panel
         self.advise("Listening for another master.", "Then the line is scanned.")
         text = (await other_masters.listen_first(opened.line, other_masters.LISTEN)).text
         if text:
@@ -144,15 +148,15 @@ class Scanning(LineView):
         return bool(text)
 
     def tell_search(self) -> None:
-        """Show the search until the first drive answers."""
+        """Show that the scan runs; the first drive that answers replaces this text."""
         self.advise("Scanning for drives.", "They appear here. Press Esc to end the scan.")
 
     def sum_up(self, devices: Sequence[int]) -> None:
-        """Show the result of a finished search."""
+        """Report the result of a finished scan."""
         from tui.session.connect.addresses import addresses_text
 
         if not self.found and self.search is not None and self.search.answered:
-            return  # that something came, and why it is no drive, was told
+            return  # `_take` has reported each answer
         if not self.found:
             text = NONE_AT_ADDRESS if len(devices) == 1 else NONE_AT_ADDRESSES
             self.say(text.format(addresses_text(devices)), AFTER_NO_ANSWER, ALARM_KIND)
@@ -161,7 +165,7 @@ class Scanning(LineView):
         self.say(f"Scan done: {there} of {len(devices)} addresses answered.", "")
 
     async def _take(self, result: ScanResult) -> None:
-        """Keep a drive that answered, with its profile and state."""
+        """Add a drive that answered, with its profile; report a damaged identification."""
         if result.error:
             self.unclear |= {result.device}
             text = f"{result.error} A device has this address."
@@ -172,24 +176,27 @@ class Scanning(LineView):
             self.unclear -= {result.device}
             await self._equip(result.identity)
         elif (fleet := self.app.fleet) is not None and fleet.console(result.device) is None:
-            # of no family, not even of the one typed; a drive that is known keeps its stop keys
+            # assign no profile, not even the typed one; a known drive keeps its stop keys
             fleet.note(result.identity)
         self.look()
         self._lead_to_drives()
 
     def _lead_to_drives(self) -> None:
-        """The cursor goes from the lines to the first drive that is found on the open one, once."""
+        """Move the cursor from the lines to the drives, once per scan."""
         if not self._led and self.focused in (None, self.lines):
             self.drives.focus()
         self._led = True
 
     @property
     def scanning(self) -> bool:
-        """True if drives are searched for now."""
+        """True while a scan runs."""
         return self.search is not None and self.search.goes_on
 
     async def _equip(self, identity: DriveIdentity) -> None:
-        """Keep a drive that answered with its profile: the typed one, else the one that fits."""
+        """Add a drive with its profile: the typed one, else the identified, named or likeliest one.
+
+        Without a profile, or if loading it fails, add only the identity.
+        """
         from tui.drive.profile import library
         from tui.session.drive import DriveSession
 
@@ -209,7 +216,7 @@ class Scanning(LineView):
         try:
             profile = await asyncio.to_thread(library.load, wanted)
             if identity.profile is not None:
-                # at hand for a stop, which goes by what the drive says of itself
+                # loaded for a stop, which uses the identified profile
                 await asyncio.to_thread(library.load, identity.profile)
         except DriveError as error:
             fleet.note(identity)
@@ -226,14 +233,14 @@ class Scanning(LineView):
         known = self.app.opened.known if self.app.opened else None
         if known is not None:
             reported = (identity, identity.device, "" if guessed else console.session.profile.id)
-            # reads files: in a thread that nobody waits for
+            # note() reads files, and no caller needs its result
             threading.Thread(
                 target=known.note, args=reported, name="known line", daemon=True
             ).start()
 
     @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:
-        """Open Monitor on a drive."""
+        """Open Monitor on a drive; if it has no profile, ask for one."""
         drive = self.found.get(device)
         if drive is None:
             return
@@ -254,7 +261,7 @@ class Scanning(LineView):
         self.app.show_monitor(drive.console)
 
     def action_stop_scan(self) -> None:
-        """Out of a field, with what was typed there; else end the search."""
+        """Leave a field and keep its text; outside a field, end the scan."""
         if isinstance(self.focused, Input):
             self.lines.focus()
             return
@@ -265,15 +272,15 @@ class Scanning(LineView):
             self.look()
 
     def end_search(self) -> None:
-        """End the scan: no more addresses are polled."""
+        """Cancel the scan; no further address is probed."""
         self.workers.cancel_group(self, "scan")
 
     def action_addresses(self) -> None:
-        """Change the addresses to ask."""
+        """Focus the addresses field."""
         self.form.ask_for_addresses()
 
     def forget_drives(self) -> None:
-        """Let go of what was found, and stop looking."""
+        """End the scan and remove all drives of the shown line, which ends their polling."""
         self.end_search()
         self.workers.cancel_group(self, "open")
         if self.app.fleet is not None:
@@ -283,7 +290,7 @@ class Scanning(LineView):
 
 
 def _families() -> str:
-    """Name the families with a line timeout from the first request, in a sentence; reads files."""
+    """Return a sentence on the families whose timeout starts at the first request; reads files."""
     from tui.drive.finding import watching_families, watching_text
     from tui.session.connect.address_prober import known_profiles
 
@@ -292,7 +299,7 @@ def _families() -> str:
 
 
 def _named(line: str, device: int) -> str | None:
-    """The profile that the settings file names for a drive that does not say what it is."""
+    """Return the profile that the settings file names for a drive, if any; reads files."""
     from tui.session.connect.line_key import line_key
     from tui.session.connect.named_lines import profile_named
 
@@ -300,7 +307,7 @@ def _named(line: str, device: int) -> str | None:
 
 
 def _remember(line: str, addresses: str) -> None:
-    """Keep the addresses of a line for the next time it is opened."""
+    """Store the addresses of a line for the next time it is opened; writes a file."""
     from tui.session.connect.line_key import line_key
     from tui.session.paths import remember_addresses
 

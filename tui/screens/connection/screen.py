@@ -1,4 +1,4 @@
-"""Line: choose a line, find the drives on it, see what all of them do."""
+"""Line: choose a line, find its drives, and monitor all of them."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 
 
 class DiagnosisTarget(LineKeys):
-    """The line under the cursor, the drive under the cursor, else the first address to search."""
+    """Target of a diagnosis: the line and drive under the cursor, else the first address."""
 
     def why_target_now(self) -> WhyTarget | None:
-        """None where no line is chosen, or no address can be made out."""
+        """Return the drive to diagnose; None without a line or a valid address."""
         text = self._line_target()
         if not text:
             return None
@@ -47,7 +47,7 @@ class DiagnosisTarget(LineKeys):
         )
 
     def line_to_hear(self) -> tuple[str, str]:
-        """The line that is meant, empty for none, and the profile that was typed for it."""
+        """Return the line to monitor, empty if there is none, and the profile typed for it."""
         return self._line_target(), self.form.profile
 
     def _line_target(self) -> str:
@@ -63,14 +63,14 @@ class DiagnosisTarget(LineKeys):
             return None
 
     def _trouble_of(self, text: str) -> LineError | None:
-        """Why this line could not be opened when that was tried last."""
+        """Return the error of the last attempt to open this line; None if it did not fail."""
         if self.refused is None or not same_line(self.refused[0], text):
             return None
         return self.refused[1]
 
 
 class ConnectionScreen(DiagnosisTarget, OtherSettings):
-    """Actions of the cursor and Enter in the two lists."""
+    """Screen with the cursor and Enter actions of its two lists."""
 
     CSS_PATH = "connection.tcss"
     BINDINGS: ClassVar = bindings(CONNECTION)
@@ -78,14 +78,14 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
     AUTO_FOCUS = "#lines"
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
-        """Enter on a line opens it, Enter on a drive watches it."""
+        """Open the chosen line, or Monitor on the chosen drive."""
         if event.option_list is self.drives:
             self.open_drive(int(event.option.id or 0))
         elif choice := self.lines.choice(event.option.id):
             self.open_line(self.line_of(choice), choice.device)
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
-        """Say all that the chosen drive says of itself; only a port has settings."""
+        """Show details of the chosen drive, or enable the serial settings for a chosen port."""
         if event.option_list is self.lines:
             choice = self.lines.choice(event.option.id)
             self.form.offer_settings(bool(choice and choice.path))
@@ -93,7 +93,7 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
             self.show_about()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Enter in a field: other addresses are for the line that is open."""
+        """Scan the open line at the typed addresses; from another field, open the chosen line."""
         if event.input.id != "addresses" or self.app.fleet is None:
             self.action_open_chosen()
             return
@@ -101,30 +101,30 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
             self.lines.focus()
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
-        """Enter in a field does what it does in the list; other addresses are searched."""
+        """Return the effects of Enter and Esc in a field; Enter scans if the line is open."""
         field = self.focused
         asks = field is not None and field.id == "addresses" and self.app.fleet is not None
         searches = asks or self.is_on_open_line()
         return (("Enter", "scan" if searches else "open"), ("Esc", "list"))
 
     def point_at(self, device: int) -> None:
-        """The cursor on the drive that is open: Enter opens that one again."""
+        """Move the cursor to the open drive, so that Enter opens it again."""
         self.drives.point_at(device)
 
     @property
     def pointed(self) -> DriveConsole | None:
-        """The drive under the cursor, where it is known what it is."""
+        """The drive under the cursor; None if it has no profile."""
         drive = self.found.get(self.drives.chosen or 0)
         return drive.console if drive else None
 
     def action_open_chosen(self) -> None:
-        """Open the chosen entry of a list; a field passes Enter to the list of lines."""
+        """Open the chosen entry of a list; from a field, open the chosen line or scan it."""
         focused = self.focused
         if isinstance(focused, OptionList):
             focused.action_select()
             return
         self.lines.focus()
         if self.is_on_open_line():
-            self.action_scan()  # by what was typed
+            self.action_scan()  # with the typed addresses and profile
         else:
             self.lines.action_select()

@@ -1,4 +1,4 @@
-"""Contents of Line: lines and fields at the left, the drives of the open line at the right."""
+"""Contents of Line: lines and form on the left, drives of the open line on the right."""
 
 from __future__ import annotations
 
@@ -36,12 +36,11 @@ if TYPE_CHECKING:
     from tui.session.monitor.look import Look
 
 IN_MINUTES = 100
-"""Seconds from which on a time is given in minutes."""
+"""Seconds from which a remaining time is shown in minutes."""
 
 
 def left_text(search: Search | None, later: float) -> str:
-    """Return the remaining time of a search, with `later` seconds of those that follow; empty if
-    unknown."""
+    """Return the remaining time of a search plus `later` seconds; empty if it is unknown."""
     if search is None or search.ended or not search.cost:
         return ""
     seconds = search.left + later
@@ -61,12 +60,12 @@ def far_text(search: Search, later: float, room: int) -> str:
 log = logging.getLogger(__name__)
 
 STATES = 0.5
-"""Seconds between two looks at the drives and at the line."""
+"""Refresh interval of drives and line, in seconds."""
 QUIET = 1.0
-"""Seconds without a key after which drives go to their places in the list."""
+"""Seconds without a key press after which the list of drives is sorted again."""
 SEARCH_LABEL = 11
 SEARCH_TEXT = 18
-"""Cells that show how far a search is."""
+"""Minimum cells for the progress of a scan next to its full label."""
 KEPT_FROM_TRIPPING = (
     "Kept alive while this line is open: {which}. If polling stops, they trip at the end of their"
     " communication timeout."
@@ -75,33 +74,33 @@ KEPT_FROM_REACTING = (
     "Kept alive while this line is open: {which}. If polling stops, they react at the end of their"
     " communication timeout."
 )
-"""Shown once: drives with their communication timeouts, by address."""
+"""Events shown once per drive, with its address and communication timeout in s."""
 NOBODY: Mapping[int, WallRow] = MappingProxyType({})
 
 
 class LineView(PanelScreen):
-    """Lines on the left, drives on the right, below all that is said of the drive chosen."""
+    """Lines on the left, drives on the right, details of the chosen drive below."""
 
     _was_shown = False
 
     def __init__(self) -> None:
         super().__init__()
         self.warned: set[int] = set()
-        """Devices of which it was said that they trip when they are left alone."""
+        """Devices whose reaction to lost polling has been reported."""
         self._advice = Advice(
             "No line is open.", "Choose a line and press Enter, or n to type one."
         )
         self.later = 0.0
-        """Seconds that searches take which follow the present one."""
+        """Estimated seconds of the searches that follow the current one."""
         self.families = ""
         """Possible drives that react to lost polling; shown while the line is scanned."""
         self._looking: list[Timer] = []
         self._away = self._was_lost = False
         self._typed_at = -math.inf
-        """When the last key came, in seconds of the clock."""
+        """Time of the last key press, in seconds on the monotonic clock."""
 
     def body(self) -> ComposeResult:
-        """Two columns and the lines below."""
+        """Yield the two columns, and the details of the chosen drive below."""
         with Horizontal(id="body"):
             with Vertical(id="left"):
                 yield Lines(id="lines-title", fit=_lines_title)
@@ -122,26 +121,23 @@ class LineView(PanelScreen):
 
     @property
     def lines(self) -> LineList:
-        """The list of lines."""
         return self.query_one(LineList)
 
     @property
     def drives(self) -> DriveList:
-        """The list of drives."""
         return self.query_one(DriveList)
 
     @property
     def form(self) -> LineForm:
-        """The fields."""
         return self.query_one(LineForm)
 
     @property
     def search(self) -> Search | None:
-        """The search on the open line, or the last one."""
+        """The current or last search on the open line; None if there was none."""
         return self.app.fleet.search if self.app.fleet else None
 
     def on_mount(self) -> None:
-        """Show what there is."""
+        """Fill the list of lines, report errors in the settings file, and start the refresh."""
         self.lines.look_for_lines()
         for fault in line_settings().faults:
             self.app.events.add(ALARM_KIND, fault)
@@ -150,23 +146,23 @@ class LineView(PanelScreen):
         self._looking = [self.set_interval(SELDOM if self.app.low_bandwidth else STATES, self.look)]
 
     def on_resize(self, event: Resize) -> None:
-        """Titles have the width of their columns, which is known before they are drawn."""
+        """Redraw at the new width, and again after the layout has settled."""
         self._redraw()
-        self.call_after_refresh(self._redraw)  # with a scroll bar where one came
+        self.call_after_refresh(self._redraw)  # a scroll bar may have appeared
 
     def on_screen_suspend(self) -> None:
-        """Do not change while another screen is on top.
+        """Pause the refresh while another screen is on top.
 
-        What stirs below a screen makes Textual draw the whole terminal again.
+        A change below another screen makes Textual redraw the whole terminal.
         """
         self._away = True
         for timer in self._looking:
             timer.pause()
 
     def on_screen_resume(self, event: ScreenResume) -> None:
-        """Much may have changed meanwhile."""
+        """Resume the refresh, and find lines again after another screen was on top."""
         if not self._was_shown:
-            # each part got its styles when it was put there, and the first picture waits
+            # all parts are already styled; styling them again would delay the first screen
             event.refresh_styles, self._was_shown = False, True
         if self._away:
             self._away = False
@@ -177,20 +173,20 @@ class LineView(PanelScreen):
         self.call_after_refresh(self._put_fields)
 
     async def _put_fields(self) -> None:
-        """Fields to type into: behind the first picture, and only where they are seen."""
+        """Mount the fields of the form after the first draw, if this screen is still on top."""
         if self.is_current:
             await self.form.put_fields()
 
     def _redraw(self, *, lines: bool = True) -> None:
         if not self.app.is_running:
-            return  # as in look: the parts of a screen go one by one
+            return  # as in `look`: on exit, a screen's parts are removed one by one
         if lines:
             self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
         self.show_drives()
         self.show_heads()
 
     def draw(self, width: int) -> None:
-        """The drives as they are now, the state of the line, how far the search is."""
+        """Show drives, line state and scan progress; report drives that react to lost polling."""
         super().draw(width)
         self._follow_line()
         self._redraw(lines=len(self.app.panel_lines) > 1)
@@ -200,7 +196,7 @@ class LineView(PanelScreen):
     # The drives
 
     def show_drives(self) -> None:
-        """The drives that answered, as they are now; no drawing below another screen."""
+        """Redraw the drives; does nothing below another screen."""
         if not self.is_current:
             return
         fleet, width = self.app.fleet, max(20, self.drives.size.width - 1)
@@ -223,14 +219,14 @@ class LineView(PanelScreen):
         return [heading(self.app.line_label or "No line", list(rows.values()), requested, width)]
 
     def show_about(self) -> None:
-        """All that the drive under the cursor says of itself, and what to do about one that not."""
+        """Show details of the drive under the cursor, its next step, and line health."""
         drive, fleet = self.found.get(self.drives.chosen or 0), self.app.fleet
         left = fleet.left_behind(drive.console) if drive and drive.console and fleet else ""
         line = self.app.opened.line if self.app.opened is not None else None
         self.put_all("about", about_lines(drive, left, self.size.width, line))
 
     def on_key(self, event: Key) -> None:
-        """While keys come, nothing changes its place under them."""
+        """Note the time of the key press: the list is not sorted while keys arrive."""
         self._typed_at = self.app.clock.monotonic()
         super().on_key(event)
 
@@ -240,40 +236,40 @@ class LineView(PanelScreen):
     # The titles
 
     def show_heads(self) -> None:
-        """The title of the lines, and how far the search is."""
+        """Show the title of the lines and the progress of the scan."""
         if not self.is_current:
             return
         for place, fit in (("lines-title", _lines_title), ("search", self._how_far)):
             self.put(place, fit(self.query_one(f"#{place}").size.width))
 
     def _how_far(self, width: int) -> list[Text]:
-        """Return the progress of the search."""
+        """Return the progress of the scan, or why there is none."""
         label = SEARCH_LABEL if width > SEARCH_LABEL + SEARCH_TEXT else len(" Scan ")
         far = "no line open" if self.app.fleet is None else "press s"
         if self.search is not None:
             far = far_text(self.search, self.later, width - label)
         return [pair(" Scan", far, PLAIN, label)]
 
-    # What happened
+    # Events and advice
 
     def say(self, happened: str, next_step: str, kind: str = "") -> None:
-        """Add the event, and the next step as long as there is no drive."""
+        """Record an event; while there is no drive, also show it with the next step."""
         self.app.events.add(kind or "told", happened)
         self.advise(happened, next_step, kind)
 
     def advise(self, now: str, next_step: str, kind: str = "") -> None:
-        """Show advice instead of drives, with the next step."""
+        """While there is no drive, show an event with the next step."""
         self._advice = Advice(now, next_step, kind)
         self._show_advice()
 
     def fail(self, error: Exception) -> None:
-        """Show an error with the next step."""
+        """Record an error, and show it with the next step."""
         self.app.events.add(ERROR_KIND, str(error))
         self.hint_keys(hint_for(error) if self.found else "")
         self.advise(str(error), hint_for(error), ERROR_KIND)
 
     def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
-        """An error that nobody foresaw: all of it to the log, one line to the person."""
+        """Log an unexpected error with its traceback, and report it in one line."""
         if event.state is WorkerState.ERROR:
             log.error("%s failed", event.worker.name, exc_info=event.worker.error)
             self.say(
@@ -289,7 +285,7 @@ class LineView(PanelScreen):
         self.put("message", [] if self.found else self._advice_lines(width))
 
     def _advice_lines(self, width: int) -> list[Text]:
-        """Return the event and the next step, in the column at the right."""
+        """Lay out the current advice for the right column."""
         return advice_lines(
             self._advice,
             width,
@@ -299,7 +295,7 @@ class LineView(PanelScreen):
         )
 
     def _follow_line(self) -> None:
-        """While no drive is found: a line that is lost, and that came back."""
+        """Show that the line is lost, and that it is back; visible while there is no drive."""
         opened = self.app.opened
         if opened is None:
             return
@@ -316,12 +312,12 @@ class LineView(PanelScreen):
         return opened is not None and opened.line.state.status.value == "connected"
 
     def _warn(self, looks: Mapping[int, Look]) -> None:
-        """Say once of a drive that it trips when it is left alone."""
+        """Report each drive with an active communication timeout once."""
         assert self.app.fleet is not None
         watching = {d: look.timeout for d, look in looks.items() if look.timeout is not None}
         new = {device: timeout for device, timeout in watching.items() if device not in self.warned}
         if not new or self.app.fleet.line_watch.unread():
-            return  # all of them at once
+            return  # wait, and report all drives together
         self.warned |= new.keys()
         which = ", ".join(f"{device} ({timeout:g} s)" for device, timeout in sorted(new.items()))
         watches = [self.app.fleet.line_watch.watch(device) for device in new]
@@ -331,5 +327,4 @@ class LineView(PanelScreen):
 
 
 def _lines_title(width: int) -> list[Text]:
-    """The title of the lines."""
     return [rule("Lines", width)]

@@ -1,4 +1,4 @@
-"""The table of the drives of a line: a row for each, at fixed places; pure functions."""
+"""Table of the drives of a line: a row for each, in fixed columns. Pure functions."""
 
 from __future__ import annotations
 
@@ -41,27 +41,27 @@ FULL = "━"
 
 
 class WallRow(NamedTuple):
-    """A drive at one moment, in words and figures; what is not known is empty."""
+    """Drive at one moment, as text; unknown values are empty."""
 
     device: int
     drive: str
     name: str = ""
     kind: str = "none"
-    """Kind of its state, `stop` while a stop is under way, `none` if there is none to show."""
+    """Kind of its state; `stop` or `stop failed` during a stop, `none` without a state."""
     words: str = ""
     frequency: str = ""
     current: str = ""
     current_unit: str = "A"
     share: float | None = None
-    """Its current over the rated one."""
+    """Motor current as a fraction of the rated current; None if unknown."""
     age: float | None = None
-    """Seconds since the shown value was on the wire."""
+    """Seconds since the shown values were received; None if there are none."""
     old: bool = False
-    """True if that is too long ago to be the present."""
+    """True if the values are too old to count as current."""
 
 
 class WallColumns(NamedTuple):
-    """Widths of the columns; 0 for one that there is no room for."""
+    """Widths of the variable columns in cells; 0 hides a column."""
 
     drive: int
     name: int
@@ -70,7 +70,7 @@ class WallColumns(NamedTuple):
 
     @property
     def taken(self) -> int:
-        """Cells that a row takes: with device, Hz, A and age."""
+        """Cells of a whole row, with device, Hz, A and age."""
         given = (self.drive, self.name, self.state, self.load)
         return DEVICE + HERTZ + CURRENT + AGE + 1 + sum(width + 1 for width in given if width)
 
@@ -89,23 +89,26 @@ LAYOUTS = (
     WallColumns(0, 0, 12, 0),
     WallColumns(0, 0, 10, 0),
 )
-"""The widest first: the load goes first, then the name."""
+"""Layouts from wide to narrow: the load is hidden first, then the name, then the drive."""
 
 
 def columns_for(width: int) -> WallColumns:
-    """The columns that fit a width; what is left over widens the state, as faults have names."""
+    """Return the widest layout that fits; spare cells go to the state, which has fault names."""
     found = next((layout for layout in LAYOUTS if layout.taken <= width), LAYOUTS[-1])
     return found._replace(state=min(WIDEST_STATE, found.state + max(0, width - found.taken)))
 
 
 def in_order(devices: Iterable[int], faults: Sequence[int]) -> list[int]:
-    """Drives in fault first, the one that tripped first before the others; then by device."""
+    """Sort devices: those in `faults` first and in that order, then the others by address."""
     first = {device: place for place, device in enumerate(faults)}
     return sorted(devices, key=lambda device: (first.get(device, len(first)), device))
 
 
 def heading(label: str, rows: Sequence[WallRow], requested: int, width: int) -> Text:
-    """The title of the table: which line, how many are in fault or lost, how many answered."""
+    """Draw the title of the table: line, number in fault, number lost, number that answered.
+
+    `requested` is the number of addresses in the scan.
+    """
     if not rows:
         return rule(short(label, max(4, width - 2)), width)
     faults = sum(row.kind == "fault" for row in rows)
@@ -123,7 +126,6 @@ def heading(label: str, rows: Sequence[WallRow], requested: int, width: int) -> 
 
 
 def column_heads(columns: WallColumns) -> Text:
-    """The names of the columns above their places."""
     text = Text(f"{'Dev':>{DEVICE + 1}}", FAINT, no_wrap=True)
     for title, width in (("Drive", columns.drive), ("Name", columns.name)):
         text.append(f" {title:<{width}}" if width else "")
@@ -134,9 +136,9 @@ def column_heads(columns: WallColumns) -> Text:
 
 @lru_cache(maxsize=512)
 def wall_line(row: WallRow, columns: WallColumns) -> Text:
-    """A drive in one line: nothing in it moves when a value changes.
+    """Draw a drive in one row; no column moves when a value changes.
 
-    The same row gives the same line again, which is not to be changed.
+    The Text is cached: callers must not modify it.
     """
     text = Text(no_wrap=True, overflow="ellipsis")
     text.append(f"{row.device:>{DEVICE + 1}}", FAINT)
@@ -163,7 +165,7 @@ def wall_line(row: WallRow, columns: WallColumns) -> Text:
 
 
 def load_bar(share: float | None, width: int) -> Text:
-    """A thin bar from nothing to the rated current; empty where that is not known."""
+    """Draw a bar from 0 to the rated current; blank if `share` is None, alarm color above 1."""
     if share is None:
         return Text(" " * width)
     inner = width - 2
@@ -176,7 +178,7 @@ def load_bar(share: float | None, width: int) -> Text:
 
 
 def _age(age: float | None) -> str:
-    """An age in whole seconds, minutes or hours, in at most five cells."""
+    """Format an age in whole seconds, minutes (m) or hours (h), in at most five cells."""
     if age is None:
         return ""
     if age < 100:

@@ -1,1 +1,1 @@
-"""Faults: what the drive tripped on, and what it stored."""
+"""Faults screen: the drive's faults with their causes, checks and stored values."""

@@ -1,4 +1,4 @@
-"""A fault, what it points at, and the drive's history, as lines; pure functions."""
+"""Rows of a fault, its causes and checks, and the drive's history; pure functions."""
 
 from __future__ import annotations
 
@@ -34,9 +34,9 @@ from .view import stored_text
 LABEL = 13
 """Columns of the headings at the left."""
 TRUST_WIDTH = 11
-"""Columns at the right that say how surely a thing is known."""
+"""Columns at the right for the certainty of a cause or check."""
 RESET_LINES = 8
-"""Lines of how a fault ends at most, at 60 columns."""
+"""Most rows of the text about the reset, at 60 columns."""
 CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
 OPENS = "Enter open "
 TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
@@ -47,16 +47,16 @@ TRIP_QUANTITIES: Mapping[Quantity, str] = {
     "mains_voltage": "mains ",
 }
 CONTACTS = ("digital_inputs", "digital_outputs")
-"""Words that are shown by the names of closed inputs, not in hexadecimal."""
+"""Words shown by the names of their set bits, not in hexadecimal."""
 STORED_MARK = " stored"
 STORED_WIDTH = len(STORED_MARK) + 28
-"""Columns of what the drive stored; the mark keeps it apart from what was last read here."""
+"""Columns of the values that the drive stored; the mark separates them from values read now."""
 STORED_UNITS = ("Hz", "A", "h")
-"""Values of a fault in the history, if the drive stores them."""
+"""Units of the values shown for a fault of the history, if the drive stores them."""
 
 
 def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
-    """The whole of it, in so many lines; where room is short, without the empty ones."""
+    """Return the whole page in at most `height` rows; empty rows are dropped first."""
     parts = [
         _headline(view, width),
         _probable(view, width),
@@ -80,9 +80,9 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
 
 
 def _shorten(parts: list[list[Text]], lines: int) -> None:
-    """Take so many lines away where room is short: checks, then causes, then parameters.
+    """Remove up to `lines` rows: first checks, then causes, then parameters.
 
-    How the fault ends stays: it says what may start the motor.
+    One row of each stays. The reset is not shortened: it shows what may start the motor.
     """
     for part in (parts[3], parts[1], parts[2]):
         away = max(0, min(lines, len(part) - 1))
@@ -91,7 +91,7 @@ def _shorten(parts: list[list[Text]], lines: int) -> None:
 
 
 def _shown_count(view: DoctorView) -> int:
-    """Return the number of faults in the history with a line: those after the last one are none."""
+    """Return the rows of the history: up to the last fault or the cursor, at least 1."""
     raws = [r.raw if (r := view.readings.get(code)) else None for code in view.history]
     some = [n for n, raw in enumerate(raws) if raw not in (None, view.profile.data.faults.none)]
     return max([1, *(n + 1 for n in some), view.at - len(view.look_at) + 1])
@@ -126,7 +126,7 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
 
 
 def _tripped(view: DoctorView) -> str:
-    """When it tripped, or since when it is seen, and what was last read of the motor before."""
+    """Return the time of the trip or of the first read, and the last values before the trip."""
     record = view.record
     if view.since is not None:
         when = view.since.when
@@ -137,7 +137,7 @@ def _tripped(view: DoctorView) -> str:
     if record is None:
         return when if view.since and view.since.tripped else f"{when}, tripped earlier"
     before = [moment for moment in record.moments if moment.wall < record.wall]
-    texts = before[-1].texts if before else ()  # at the trip itself the motor is free already
+    texts = before[-1].texts if before else ()  # at the trip itself the motor already coasts
     values = dict(zip(record.codes, texts, strict=False))
     parts = []
     for quantity, name in TRIP_QUANTITIES.items():
@@ -149,7 +149,7 @@ def _tripped(view: DoctorView) -> str:
 
 
 def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
-    """Lines after a heading that precedes the first."""
+    """Return the lines, indented, with a label at the left of the first."""
     return [
         Text.assemble((f"  {label if not number else '':<{LABEL - 2}}", FAINT)).append_text(line)
         for number, line in enumerate(lines)
@@ -157,13 +157,13 @@ def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
 
 
 def _wrapped(texts: Sequence[str], width: int) -> list[Text]:
-    """A text a line, the first with room behind it for how surely it is known."""
+    """Return one row per text; the first leaves room for its certainty."""
     rooms = [max(10, width - LABEL - (TRUST_WIDTH if not n else 1)) for n in range(len(texts))]
     return [Text(cut(text, room), PLAIN) for text, room in zip(texts, rooms, strict=True)]
 
 
 def _excluded(left: FaultAdvice, texts: Sequence[str], width: int) -> list[Text]:
-    """Those of the texts that a value rules out, behind the reason."""
+    """Return those of the texts that a value rules out, each after the reason."""
     room = max(10, width - LABEL - 1)
     return [
         Text(cut_at_word(f"({advice.reason}) {advice.text}", room), FAINT)
@@ -214,7 +214,7 @@ def _look_at(view: DoctorView, width: int) -> list[Text]:
 
 
 def _value_cells(view: DoctorView, width: int) -> int:
-    """Columns of the values: as many as they take, where their reasons leave so many."""
+    """Return the columns of the values: as many as they need, if their reasons leave room."""
     longest = max(
         (len(_value(view.readings.get(look.code), view.now)[0]) for look in view.look_at), default=0
     )
@@ -248,7 +248,7 @@ def _checks(view: DoctorView, width: int) -> list[Text]:
         left = view.advice
         assert left is not None
         lines = _wrapped(left.check, width)
-        if lines and help_.confidence != "practice":  # checks are practice whatever the cause is
+        if lines and help_.confidence != "practice":  # checks are always practice
             lines[0].append(f" {TRUST_MARKS['practice']:>8}", FAINT)
         return _labelled("Check", lines + _excluded(left, help_.check, width))
     if fault is not None and fault.remedy:
@@ -261,7 +261,7 @@ def _reset(view: DoctorView, width: int) -> list[Text]:
         return []
     message = reset_text(view.help, view.ready, "x", view.follows)
     room = max(10, width - LABEL - TRUST_WIDTH)
-    # in as many lines as it takes: what may start the motor is never cut off
+    # as many rows as needed: a warning that the motor may start is never cut off
     lines = [Text(cut(part, room), PLAIN) for part in wrapped(message.text, room, RESET_LINES)]
     if lines[0].plain.startswith("x "):
         lines[0].stylize(KEY, 0, 1)
@@ -270,7 +270,7 @@ def _reset(view: DoctorView, width: int) -> list[Text]:
 
 
 def _history(view: DoctorView, width: int, height: int) -> list[Text]:
-    """The drive's own list, scrolled to the cursor; each with what it stored."""
+    """Return the drive's history, scrolled to the cursor, with the values stored for each fault."""
     if height < 1:
         return []
     if not view.history:
@@ -305,7 +305,7 @@ def _past_text(view: DoctorView, code: str) -> str:
 
 
 def _past_stored(view: DoctorView, number: int, code: str) -> str:
-    """Return what the drive stored of a past fault; empty if there was no fault."""
+    """Return the values that the drive stored for a past fault; empty if there was no fault."""
     faults = view.profile.data.faults
     if number >= len(faults.stored) or _past_fault(view, code) == faults.none:
         return ""
@@ -313,7 +313,7 @@ def _past_stored(view: DoctorView, number: int, code: str) -> str:
 
 
 def _past(view: DoctorView, number: int, name: str, stored: str, width: int) -> Text:
-    """One past fault; none is dim."""
+    """Return the row of a past fault; it is dim without a known fault."""
     raw = _past_fault(view, view.history[number])
     text = Text(f"{number + 1 if number else 'last':<5}", no_wrap=True)
     text.append(name, FAINT if raw in (None, view.profile.data.faults.none) else PLAIN)
@@ -325,7 +325,7 @@ def _past(view: DoctorView, number: int, name: str, stored: str, width: int) -> 
 
 
 def _stored(view: DoctorView, codes: Sequence[str]) -> str:
-    """Frequency, current and hours that the drive stored of a fault, each at its place."""
+    """Return the frequency, current and hours stored for a fault, each in its column."""
     found = dict.fromkeys(STORED_UNITS, "")
     for code in codes:
         reading = view.readings.get(code)

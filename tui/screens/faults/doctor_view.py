@@ -23,31 +23,31 @@ class DoctorView:
     present: bool
     """True if the drive is in this fault now."""
     record: FaultRecord | None
-    """The trip as the panel saw it, where it did and this is the fault."""
+    """Record of the trip into this fault; None if the panel did not observe it."""
     readings: Mapping[str, Shown]
     now: float
     """Monotonic time of the moment."""
     since: PresentFault | None = None
-    """The one record of when it tripped, or was first seen; that of the line."""
+    """Entry of the line's alarms, with the time of the trip or of the first read."""
     at: int = 0
-    """The row of the cursor: parameters to look at first, then the history."""
+    """Row of the cursor: first the parameters to check, then the history."""
     unread: bool = False
-    """True if the history is being read yet."""
+    """True until the history has been read."""
     raws: Mapping[str, int] = field(default_factory=dict)
-    """All raw values that the drive was last seen to hold."""
+    """Last known raw values of the drive, by code."""
     alarms: Sequence[tuple[str, int, str]] = ()
-    """Alarms that are on: word, bit and name; shown if there is no fault."""
+    """Active alarms as word, bit and name; shown if there is no fault."""
 
     @property
     def help(self) -> FaultHelp | None:
-        """Help on the fault; on any fault of a family whose trips have no numbers."""
+        """Help on the fault, or on any fault of a family whose faults have no numbers."""
         if self.fault is None and not self.present:
             return None
         return self.profile.guide.fault(self.fault.raw if self.fault else None)
 
     @property
     def alarm(self) -> tuple[str, int, str] | None:
-        """The alarm that is shown: the first that anything is known of."""
+        """Alarm to show, the first with help if any has help; None if there is a fault."""
         if self.fault is not None or self.present or not self.alarms:
             return None
         known = [pair for pair in self.alarms if self.profile.guide.alarm(pair[0], pair[1])]
@@ -55,13 +55,13 @@ class DoctorView:
 
     @property
     def hint(self) -> Hint | None:
-        """Help on the fault or the alarm."""
+        """Help on the shown alarm, else on the fault."""
         alarm = self.alarm
         return self.profile.guide.alarm(alarm[0], alarm[1]) if alarm else self.help
 
     @property
     def advice(self) -> FaultAdvice | None:
-        """The causes and checks that the present values leave."""
+        """Causes and checks that the present values do not rule out; None without help."""
         if self.hint is None:
             return None
         latest = self.present or self.record is not None
@@ -69,26 +69,26 @@ class DoctorView:
 
     @property
     def look_at(self) -> Sequence[LookAt]:
-        """The parameters to look at."""
+        """Parameters to check, with reasons; empty without help."""
         return self.hint.look_at if self.hint else ()
 
     @property
     def ready(self) -> bool | None:
-        """True if the drive says that a reset can work now; None if it does not report it."""
+        """True if the drive reports that a reset can work now; None if it does not report this."""
         return reset_ready(self.profile, self._good())
 
     @property
     def follows(self) -> str:
-        """The motor's reaction to a reset now, with the inputs that are closed."""
+        """The motor's reaction to a reset now, given its present inputs."""
         good = self._good()
         return reset_follows(self.profile, {**self.raws, **good}, good)
 
     @property
     def history(self) -> list[str]:
-        """The codes of the drive's history, the newest first."""
+        """Codes of the parameters that hold the drive's history, newest first."""
         return self.profile.data.faults.history
 
     def _good(self) -> dict[str, int]:
-        """Present raw values."""
+        """Return the raw values of good quality, by code."""
         readings = self.readings.items()
         return {c: r.raw for c, r in readings if r.quality == "good" and r.raw is not None}

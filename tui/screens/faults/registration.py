@@ -1,4 +1,4 @@
-"""Registration of Faults: what the panel lists, and the keys."""
+"""Registration of Faults: its title, description and keys."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def create_faults(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
+    """Create Faults for a drive; the import waits until the screen is needed."""
     from .screen import FaultsScreen
 
     return FaultsScreen(console)

@@ -1,4 +1,4 @@
-"""Faults: what tripped the drive, what that points at, its history, the seconds before."""
+"""Faults screen: a fault with its causes, the history, and the seconds before a trip."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ from .doctor_view import DoctorView
 from .view import record_lines, stored_lines, stored_text
 
 STORED = 52
-"""Columns of what the drive stored, where there is room: values stay beside their names."""
+"""Most columns of the drive's stored values, so that values stay close to their names."""
 STEP = 5
-"""Rows of the record that a key moves by."""
+"""Rows of the record that a key press scrolls."""
 READ_AGAIN = 2.0
-"""Seconds between two looks at the parameters that a fault points at."""
+"""Seconds between two reads of the parameters to check."""
 OLD = 3 * READ_AGAIN
-"""Seconds after which a value that was read is shown as an old one."""
+"""Age in seconds above which a value is shown as old."""
 BESIDE = 36
-"""Rows from which on the seconds before the trip are below the doctor."""
+"""Least terminal rows to show the seconds before the trip below the doctor."""
 DOCTOR_ROWS = 24
 
 
 class FaultsScreen(OrderKeys):
-    """Present or last fault of the drive; or the chosen one of its history."""
+    """Present or last fault of the drive, or a selected fault of its history."""
 
     CSS_PATH = "faults.tcss"
     BINDINGS: ClassVar = bindings(FAULTS)
@@ -55,24 +55,24 @@ class FaultsScreen(OrderKeys):
         self._readings: dict[str, Shown] = {}
         self._shown: FaultRecord | None = None
         self._chosen: FaultCode | None = None
-        """A fault of the history that was chosen."""
+        """Fault selected in the history; None for the present or last fault."""
         self._unread = True
         self._at = 0
         self._offset = 0
         self._before = False
-        """True if the seconds before the trip are shown in place of the doctor."""
+        """True if the seconds before the trip are shown instead of the doctor."""
 
     @property
     def _recorder(self) -> Recorder:
         return self.console.recorder
 
     def body(self) -> ComposeResult:
-        """The doctor above, the record below where there is room."""
+        """Create the doctor and, below it, the record."""
         yield Lines(id="doctor")
         yield Lines(id="record")
 
     def on_mount(self) -> None:
-        """Read the history; who opens this screen has seen the trip."""
+        """Acknowledge the trip, which is visible now, and start reading the history."""
         self._see()
         self._shown = self._recorder.latest
         self._read_again()
@@ -85,7 +85,7 @@ class FaultsScreen(OrderKeys):
 
     def _read_again(self) -> None:
         if self.is_current:
-            # the method, not its coroutine: one that is replaced before it began would warn
+            # pass the method: a coroutine that is replaced before it starts causes a warning
             self.run_worker(self._read, exclusive=True, group="faults")  # type: ignore[arg-type]
 
     async def _read(self) -> None:
@@ -111,7 +111,10 @@ class FaultsScreen(OrderKeys):
         self.look()
 
     def doctor(self) -> DoctorView:
-        """Return the present contents."""
+        """Return the contents: the present fault, else an alarm, else the last trip.
+
+        A fault selected in the history takes precedence over all three.
+        """
         latest, record = self.console.monitor.latest, self._recorder.latest
         present = latest is not None and not latest.error and latest.state.kind == "fault"
         fault = latest.state.fault if latest is not None and present else None
@@ -119,7 +122,7 @@ class FaultsScreen(OrderKeys):
             fault = record.fault if record else None
         alarms = self._alarms()
         if alarms and not present:
-            fault = None  # a warning of now comes before the trip that was
+            fault = None  # a present alarm takes precedence over a past trip
         if self._chosen is not None:
             present = present and fault is not None and fault.raw == self._chosen.raw
             fault = self._chosen
@@ -145,7 +148,7 @@ class FaultsScreen(OrderKeys):
         )
 
     def _alarms(self) -> list[tuple[str, int, str]]:
-        """Alarms that are on in the values of the monitor."""
+        """Return the active alarms in the monitor's values, as word, bit and name."""
         latest = self.console.monitor.latest
         if latest is None or latest.error:
             return []
@@ -153,7 +156,7 @@ class FaultsScreen(OrderKeys):
         return alarms_on(self.session.profile, raws)
 
     def draw(self, width: int) -> None:
-        """Show what there is; a new trip counts as seen."""
+        """Draw the doctor and the record; acknowledge a new trip, which is visible now."""
         super().draw(width)
         record = self._recorder.latest
         if record is not self._shown:
@@ -170,12 +173,12 @@ class FaultsScreen(OrderKeys):
         self.query_one("#doctor", Lines).display = doctor > 0
         self.query_one("#record", Lines).display = below > 0
         lines = doctor_lines(self.doctor(), width, doctor) if doctor else []
-        # so many rows however much there is to tell: what stands below them does not move
+        # always the same number of rows, so that the record below does not move
         self.put("doctor", [*lines, *[Text("")] * (doctor - len(lines))])
         self.put("record", self._past(width, below) if below else [])
 
     def _past(self, width: int, rows: int) -> list[Text]:
-        """Return the values stored with the chosen fault, and the seconds before the trip."""
+        """Return the seconds before the trip; on their own page also the fault's stored values."""
         stored = []
         if self._before:
             codes = self._stored()
@@ -185,20 +188,20 @@ class FaultsScreen(OrderKeys):
         return [*stored, *record_lines(self._shown, width, room, self._offset)]
 
     def _stored(self) -> list[str]:
-        """Codes that the drive keeps of the chosen fault."""
+        """Return the codes of the values that the drive stores for the fault under the cursor."""
         stored = self.session.profile.data.faults.stored
         at = max(0, self._at - len(self.doctor().look_at))
         return stored[at] if at < len(stored) else []
 
     def action_move(self, rows: int) -> None:
-        """Another parameter to look at, or another fault of the history."""
+        """Move the cursor by `rows` through the parameters to check and the history."""
         view = self.doctor()
         most = len(view.look_at) + len(view.history) - 1
         self._at = max(0, min(most, self._at + rows))
         self.look()
 
     async def action_open(self) -> None:
-        """Open the parameter under the cursor in the editor, or look at that fault."""
+        """Open the parameter under the cursor in the editor, or show that past fault."""
         view = self.doctor()
         if self._at < len(view.look_at):
             await self.app.open_parameter(view.look_at[self._at].code)
@@ -214,12 +217,12 @@ class FaultsScreen(OrderKeys):
         self.look()
 
     def action_other_page(self) -> None:
-        """The seconds before the trip, or the doctor again."""
+        """Switch between the doctor and the seconds before the trip."""
         self._before = not self._before
         self.look()
 
     def action_leave(self) -> None:
-        """Go from a fault of the history to the present one, then back to Monitor."""
+        """Return from a past fault or the record to the present fault, then to Monitor."""
         if self._chosen is not None or self._before:
             self._chosen, self._before, self._at = None, False, 0
             self.look()
@@ -227,13 +230,13 @@ class FaultsScreen(OrderKeys):
             self.app.pop_screen()
 
     def action_move_record(self, rows: int) -> None:
-        """Older or newer values of the record."""
+        """Scroll the record by `rows` times STEP; a positive number shows older values."""
         most = len(self._shown.moments) + len(self._shown.writes) - 1 if self._shown else 0
         self._offset = max(0, min(most, self._offset + rows * STEP))
         self.look()
 
     def action_save_file(self) -> None:
-        """Write the record to a file whose name the person may change."""
+        """Prompt for a file name and save the latest record as Markdown."""
         from ..dialogs.ask import Ask
 
         record = self._recorder.latest

@@ -1,4 +1,4 @@
-"""Values stored with a fault, and the seconds before a trip, as lines; pure functions."""
+"""Rows of the values stored with a fault, and of the seconds before a trip; pure functions."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _stored_name(parameter: Parameter) -> str:
 
 
 def _stored_line(parameter: Parameter, name: str, value: str, *, held: bool) -> Text:
-    """One stored value, with its name as it fits."""
+    """Return the row of a stored value; it is dim if it was not read."""
     text = Text(f" {parameter.code:<5} ", FAINT, no_wrap=True)
     text.append(name, FAINT)
     text.append(f" {value}", STRONG if held else FAINT)
@@ -56,7 +56,7 @@ def _stored_line(parameter: Parameter, name: str, value: str, *, held: bool) -> 
 
 
 def stored_text(reading: Shown | None) -> str:
-    """A value that the drive stored at a fault: it is of that moment, however old."""
+    """Return the text of a stored value, which never ages: it belongs to the fault's moment."""
     if reading is None:
         return NOT_AVAILABLE
     return reading.drawn(
@@ -68,7 +68,7 @@ def stored_text(reading: Shown | None) -> str:
 
 
 def record_lines(record: FaultRecord | None, width: int, height: int, offset: int) -> list[Text]:
-    """Values before the trip and what was written meanwhile, the newest first."""
+    """Return the values and writes before the trip, newest first, from row `offset` on."""
     if record is None:
         return [
             rule("Before the trip", width),
@@ -85,7 +85,7 @@ def record_lines(record: FaultRecord | None, width: int, height: int, offset: in
 
 
 def record_rows(record: FaultRecord, width: int) -> list[Text]:
-    """Every cycle and every write, the newest first."""
+    """Return a row for each cycle and each write, newest first."""
     rows = [(moment.wall, _moment(moment, record, width)) for moment in record.moments]
     for entry in record.writes:
         wall = datetime.fromisoformat(entry.time).timestamp()

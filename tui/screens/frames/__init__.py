@@ -1,1 +1,1 @@
-"""Frames: what goes over the line."""
+"""Frames: the traffic on the line."""

@@ -1,7 +1,7 @@
-"""Which frames are shown: by drive, function, errors, and what they say. Pure.
+"""Filter of frames by drive, function, errors and text. Pure functions.
 
-A request and what followed it until the next one are an exchange, chosen or left as a whole: a
-refusal without its request would show little.
+A request and everything up to the next request form an exchange. A filter shows or hides whole
+exchanges, because a refusal without its request explains little.
 """
 
 from __future__ import annotations
@@ -18,21 +18,24 @@ from .decoded import EXCEPTION_BIT
 
 ERRORS = frozenset({"error", "errors"})
 MOST_DIGITS = 9
-"""Of what is taken for a number; Python counts no number of thousands of them."""
+"""Maximum digits of a number; int() raises ValueError for thousands of digits."""
 TellFrames = Callable[[Sequence[Frame]], Sequence[str]]
-"""Return the text of frames, a sentence each."""
+"""Returns a text for each frame, in order; empty if a frame has none."""
 
 
 @dataclass(frozen=True, slots=True)
 class FrameChoice:
-    """Typed filter: `2 read error RFR`. All of it must hold; of several drives one is enough."""
+    """Parsed filter, for example `2 read error RFR`.
+
+    All conditions must hold; of several drives or functions, one is enough.
+    """
 
     devices: frozenset[int] = frozenset()
     functions: frozenset[int] = frozenset()
     errors: bool = False
-    """True if only what went wrong is meant: refusals, damage, noise, silence."""
+    """True to choose only exchanges with an error: refusal, damage, noise, no reply."""
     words: tuple[str, ...] = ()
-    """Words required in the sentence, the note or the bytes of one of its frames."""
+    """Words in lower case; each must occur in the text, note or bytes of a frame."""
 
     @property
     def is_all(self) -> bool:
@@ -41,7 +44,10 @@ class FrameChoice:
 
 
 def choice_of(text: str) -> FrameChoice:
-    """Parse a filter: numbers are drives, `f16` and names of functions are functions."""
+    """Parse a filter; numbers are drives, `f16` and function names are functions.
+
+    `error` or `errors` chooses errors; other words are searched as text.
+    """
     devices, functions, words, errors = set[int](), set[int](), [], False
     for word in text.casefold().split():
         if _is_number(word):
@@ -58,12 +64,12 @@ def choice_of(text: str) -> FrameChoice:
 
 
 def _is_number(word: str) -> bool:
-    """Return True if it is a number; more digits than any has are searched for unchanged."""
+    """Return True for a number; one with over `MOST_DIGITS` digits is searched as text."""
     return word.isascii() and word.isdigit() and len(word) <= MOST_DIGITS
 
 
 def exchanges(frames: Sequence[Frame]) -> list[list[int]]:
-    """Places of frames that belong together; what comes before the first request is one too."""
+    """Group places of frames by exchange; frames before the first request form a group too."""
     found: list[list[int]] = []
     for at, frame in enumerate(frames):
         if frame.direction == "out" or not found:
@@ -75,7 +81,7 @@ def exchanges(frames: Sequence[Frame]) -> list[list[int]]:
 def chosen(
     frames: Sequence[Frame], wanted: FrameChoice, tell: TellFrames, *, tcp: bool
 ) -> list[int]:
-    """Places of the frames that are chosen, in their order."""
+    """Return the places of the chosen frames, in ascending order."""
     if wanted.is_all:
         return list(range(len(frames)))
     whole = exchanges(frames)
@@ -89,7 +95,7 @@ def chosen(
 
 
 def _fits(group: Sequence[Frame], wanted: FrameChoice, *, tcp: bool, last: bool) -> bool:
-    """Return True if drive, function and errors are those that are wanted."""
+    """Return True if an exchange matches the drives, functions and errors of the filter."""
     parts = [pdu for frame in group if (pdu := pdu_of(frame.data, tcp=tcp)) is not None]
     if wanted.devices and not wanted.devices & {pdu.device for pdu in parts}:
         return False
@@ -99,8 +105,10 @@ def _fits(group: Sequence[Frame], wanted: FrameChoice, *, tcp: bool, last: bool)
 
 
 def went_wrong(group: Sequence[Frame], *, tcp: bool, last: bool) -> bool:
-    """Return True if an exchange was refused, disturbed or not answered; the `last` may still
-    be."""
+    """Return True if an exchange was refused, disturbed or not answered.
+
+    The `last` one may still be answered, and a broadcast never is.
+    """
     for frame in group:
         pdu = pdu_of(frame.data, tcp=tcp)
         if frame.note not in ("", "echo") or pdu is None:

@@ -1,4 +1,4 @@
-"""The page of counters: ours, the drive's own, its turnarounds, and what they say. Pure."""
+"""Counters page: our counts, the drive's own, turnarounds and differences. Pure functions."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from tui.widgets.drawing import cut_at_word, rule, short, whole_sentences, wrapp
 from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNING, STRONG
 
 EIGHTHS = " ▁▂▃▄▅▆▇█"
-"""Bars of so many eighths of a row."""
+"""Bar characters from 0 to 8 eighths of a row."""
 LEFT = 42
-"""Columns of our counts; those of the drive are beside them."""
+"""Columns of our counts; the drive's own counters are to their right."""
 BAR_WIDTH = 7
 TALL, TALL_BARS, LOW_BARS = 30, 6, 1
-"""Rows from which on the bars are tall; the rows of both."""
+"""Minimum rows of the page for tall bars; rows of tall bars and of low bars."""
 LOAD_CELLS = 20
 MOST_LINES_OF_ONE = 4
 RESET_KEYS = "C restart counts, Z reset drive's counters"
 BAD = frozenset({"never-arrived", "not-answered", "damaged-there", "damaged-here", "no-answer"})
-"""Differences that are frames lost."""
+"""Kinds of differences that mean lost frames."""
 
 
 def counters_lines(found: CountersNow, who: str, width: int, height: int) -> list[Text]:
-    """The page in so many lines at most; `who` is the drive, as a person calls it."""
+    """Lay out the page in at most `height` rows; `who` names the drive in the heading."""
     by = f"counted by {found.counted_by}" if found.counted_by else "counted by this panel"
     lines = [rule(f"Counters of {who}", width, by)]
     lines += beside(our_lines(found), drive_lines(found, width - LEFT), width)
@@ -41,7 +41,10 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
 
 
 def our_lines(found: CountersNow) -> list[Text]:
-    """Return the counts of this program: since the line was opened, and since the last reset."""
+    """Return the counts since the line was opened, and since the last reset.
+
+    They are those of the program that holds the line.
+    """
     total, since = found.total, found.since
     head = Text(f" {'This panel':<15}{'since open':>12}{time_text(found.seconds):>12}", FAINT)
     rows = [
@@ -73,7 +76,7 @@ def time_text(seconds: float) -> str:
 
 
 def drive_lines(found: CountersNow, width: int) -> list[Text]:
-    """Return the counters of the drive since the first reading; refusals by their code."""
+    """Return the drive's own counters since the first reading, and refusals by exception code."""
     refused = ", ".join(f"{code}: {n}" for code, n in sorted(found.total.exceptions.items()))
     codes = [Text(f"Refused, by code  {refused}", FAINT)] if refused else []
     if found.trouble:
@@ -89,9 +92,11 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
 
 
 def _pair(name: str, comparison: Comparison) -> list[Text]:
-    """Frames as the drive reports them, those since the first reading, and how many we sent by
-    then."""
-    # counters of another port are no part of the comparison
+    """Return two rows for a pair of counters: frames, and frames with a bad checksum.
+
+    The columns are: now, since the first reading, sent by us since then.
+    """
+    # counters of another port are shown but not compared
     other = comparison.counts_this_line is False
     strong, sent = FAINT if other else STRONG, comparison.sent
     ours = min(max(comparison.frames, sent.low), sent.high)
@@ -108,7 +113,7 @@ def _pair(name: str, comparison: Comparison) -> list[Text]:
 
 
 def beside(left: Sequence[Text], right: Sequence[Text], width: int) -> list[Text]:
-    """Two columns of lines, the right one from a fixed place on."""
+    """Join two columns of rows; the right one starts at column `LEFT`."""
     lines = []
     for at in range(max(len(left), len(right))):
         text = left[at].copy() if at < len(left) else Text(no_wrap=True)
@@ -120,7 +125,7 @@ def beside(left: Sequence[Text], right: Sequence[Text], width: int) -> list[Text
 
 
 def load_lines(found: CountersNow) -> list[Text]:
-    """The share of the time in which the line was busy, since the last reset."""
+    """Return a row with the load of the line since the last reset; dashes if unknown."""
     text = Text(" load of the line ", FAINT, no_wrap=True)
     if found.line_load is None or found.device_load is None:
         return [text.append("-----", FAINT)]
@@ -132,7 +137,7 @@ def load_lines(found: CountersNow) -> list[Text]:
 
 
 def bar_lines(shown: Sequence[TurnaroundBar], rows: int) -> list[Text]:
-    """The bars, the counts under them, and up to how many ms each goes."""
+    """Return the bars in `rows` rows, then their counts, then their upper limits in ms."""
     most = max((bar.count for bar in shown), default=0)
     heights = [math.ceil(8 * rows * bar.count / most) if most else 0 for bar in shown]
     lines = []
@@ -147,14 +152,17 @@ def bar_lines(shown: Sequence[TurnaroundBar], rows: int) -> list[Text]:
 
 
 def message(found: CountersNow, width: int, room: int) -> list[Text]:
-    """Return the conclusions from the counters, a sentence each; the worst first."""
+    """Return the differences, lost frames first, or one row if the counters agree.
+
+    If they exceed `room` rows, each is shortened to one row.
+    """
     if found.agree:
         text = Text(no_wrap=True).append(" ● ", RUNNING)
         return [text.append(short(found.agreeing, width - 4), PLAIN)]
     worst = sorted(found.differences, key=lambda item: item.kind not in BAD)
     parts = [wrapped(difference.text, width - 5, MOST_LINES_OF_ONE) for difference in worst]
     if sum(map(len, parts)) > room:
-        # the first sentence of each comes before what to check for the worst
+        # the first sentence of every difference matters more than advice on the worst
         texts = [whole_sentences(difference.text, width - 5) for difference in worst]
         parts = [[cut_at_word(text, width - 5)] for text in texts]
     lines: list[Text] = []

@@ -1,4 +1,4 @@
-"""Frames in words: which drive, which function, which parameters with which values."""
+"""Text of frames: drive, function, and parameters with their values."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from tui.wire.frames import Pdu, pdu_of
 READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE = 3, 4, 6, 16, 23
 EXCEPTION_BIT = 0x80
 CODES_OF_FRAME = 3
-"""Parameters of a request that are named; the others are counted."""
+"""Maximum parameters of a request that are named; further ones are counted."""
 
 ProfileOf = Callable[[int], Profile | None]
 RawsOf = Callable[[int], Mapping[str, int]]
@@ -25,7 +25,7 @@ RawsOf = Callable[[int], Mapping[str, int]]
 
 @dataclass(frozen=True, slots=True)
 class DecodedRequest:
-    """Subject of a request: the words of a read, or none."""
+    """Registers of a read request; needed for its reply, which carries no address."""
 
     device: int
     function: int
@@ -36,7 +36,10 @@ class DecodedRequest:
 def decoded(
     frames: Sequence[Frame], profile_of: ProfileOf, raws_of: RawsOf, *, tcp: bool
 ) -> list[str]:
-    """A sentence for each frame; empty where it is none. A reply is explained by its request."""
+    """Return a text for each frame; empty if its bytes cannot be decoded.
+
+    A reply to a read is decoded with the last request, which has the address.
+    """
     requested: DecodedRequest | None = None
     found = []
     for frame in frames:
@@ -53,7 +56,7 @@ def decoded(
             else:
                 found.append(_reply(pdu, requested, words))
         except (struct.error, IndexError):
-            found.append("")  # cut short: its bytes tell all that there is
+            found.append("")  # too short to decode: the list shows the bytes
     return found
 
 
@@ -113,7 +116,7 @@ def _one(pdu: Pdu) -> tuple[int, list[int]]:
 
 @dataclass(frozen=True, slots=True)
 class _Words:
-    """Words of one drive by their parameters, as far as its profile knows them."""
+    """Decodes registers of one drive to parameters, as far as its profile defines them."""
 
     device: int
     profile: Profile | None
@@ -121,7 +124,7 @@ class _Words:
     function: int = READ
 
     def names(self, address: int, count: int) -> str:
-        """The parameters of a stretch of words; the address where none is known."""
+        """Return the codes of the parameters at these registers; the address if all are unknown."""
         found = [code for code, _, _ in self._cut(address, [0] * count)]
         named = [code for code in found if code]
         if not named:
@@ -132,14 +135,14 @@ class _Words:
         return f"{codes} + {more} more" if more > 0 else codes
 
     def values(self, address: int, raws: Sequence[int], sign: str = "") -> str:
-        """The parameters with their values, each at most once."""
+        """Return the parameters with their values; `sign` precedes each value."""
         parts = []
         for code, text, where in self._cut(address, raws):
             parts.append(f"{code or where} {sign + ' ' if sign else ''}{text}")
         return " · ".join(parts)
 
     def _cut(self, address: int, raws: Sequence[int]) -> Iterable[tuple[str, str, str]]:
-        """Code, value and address of each parameter in a stretch of words."""
+        """Yield code and value of each parameter; address and raw value of an unknown register."""
         at = 0
         while at < len(raws):
             parameter = self.profile.at(address + at, self.function) if self.profile else None

@@ -1,4 +1,4 @@
-"""One frame as a line of the list, and all of them as a text to keep. Pure."""
+"""One frame as a row of the list, and several frames as text for a file. Pure functions."""
 
 from __future__ import annotations
 
@@ -14,21 +14,21 @@ from tui.widgets.palette import ALARM, CURSOR, FAINT, PLAIN, STRONG
 from tui.wire.frames import hex_text
 
 FEWEST = 12
-"""Columns of bytes that are shown, however long the note on the frame is."""
+"""Minimum columns for text or bytes, even if the note is long."""
 BYTES_WIDTH = 44
-"""Columns of the bytes if they are beside the words."""
+"""Columns of the bytes if they are shown next to the text."""
 BESIDE_BYTES = 110
-"""Columns from which on words and bytes are side by side, and the hour before the minutes."""
+"""Minimum columns to show text and bytes side by side, and the hour in times."""
 
 
 def frame_time(wall: float) -> str:
-    """The time of day to the millisecond."""
+    """Format seconds since 1970 as the local time of day, to the millisecond."""
     thousandth = int(wall * 1000) % 1000
     return f"{time.strftime('%H:%M:%S', time.localtime(wall))}.{thousandth:03d}"
 
 
 def gap_text(seconds: float | None) -> str:
-    """The time since the frame before, in nine columns: ms up to 1 s."""
+    """Format the time since the previous frame in nine columns: ms below 1 s, then s."""
     if seconds is None:
         return " " * 9
     reported = f"{1000 * seconds:.1f} ms" if seconds < 0.9999 else f"{seconds:.2f} s"
@@ -38,7 +38,7 @@ def gap_text(seconds: float | None) -> str:
 
 
 def gaps(frames: Sequence[Frame]) -> list[float | None]:
-    """Seconds from each frame's predecessor to it, however few of them are shown."""
+    """Return the seconds between each frame and the one before it; None for the first."""
     before = [None, *(frame.time for frame in frames)][: len(frames)]
     return [
         None if value is None else max(0.0, frame.time - value)
@@ -55,10 +55,10 @@ def frame_line(
     *,
     found: bool = False,
 ) -> Text:
-    """One frame: when, how long after the one before, direction, what it says, the note on it.
+    """Draw a frame: time, gap, direction, text or bytes, note.
 
-    Bytes that form no frame, and all where there are no `words`, are shown as they are. One that
-    was `found` is marked.
+    `wall` is in seconds since 1970, `gap` in seconds. Without `words`, the bytes are shown. A frame
+    that was `found` is highlighted.
     """
     text = Text(no_wrap=True)
     at = frame_time(wall)
@@ -87,9 +87,9 @@ def frames_text(
     since_epoch: float,
     heading: Sequence[str],
 ) -> str:
-    """Frames as a text to keep: a line each, tabs between time, gap, direction, words and bytes.
+    """Format the frames at `places` as lines with tabs, after comment lines with the heading.
 
-    `since_epoch` plus the line time is the time of day; `reported` goes with the `places`.
+    `since_epoch` plus a frame's time is in seconds since 1970. `reported` has a text per place.
     """
     between = gaps(frames)
     lines = [f"# {line}" for line in heading]

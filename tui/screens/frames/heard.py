@@ -1,4 +1,4 @@
-"""Listening: traffic of a line on which nothing is sent, as frames and summed up."""
+"""Traffic of a monitored line as frames and as a summary; nothing is sent."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from ..keys.table import bindings
 from .frame_list import FrameListScreen
 
 MOST_ROWS = 6
-"""Rows of one sentence at most."""
+"""Maximum rows of one sentence."""
 OF_A_DRIVE, HANGING = 3, 5
-"""Columns before a sentence about a drive, and before the rest of it."""
+"""Indent in columns of a sentence about a drive, and of the further rows of any sentence."""
 WARNINGS = ("NOT POLLED", "TWO ANSWERS", "A SECOND MASTER", "no answer", "damaged", "Broken")
-"""Words of a sentence to be emphasized."""
+"""Phrases that put their sentence in the alarm color."""
 
 
 def heard_lines(
     summary: ListeningSummary, width: int, height: int, top: int
 ) -> tuple[list[Text], int]:
-    """A heading and as many lines as there is room for, from `top` on; and the `top` that fits."""
+    """Return the heading with the rows from `top` that fit, and `top` limited to a valid row."""
     lines = [line for text in summary_lines(summary) for line in _sentence(_here(text), width)]
     room = max(1, height - 1)
     top = max(0, min(top, len(lines) - room))
@@ -40,13 +40,13 @@ def heard_lines(
 
 
 def _here(text: str) -> str:
-    """In the words of the panel, which has a field instead of an option."""
+    """Adapt a text to the panel, which has the Profile field instead of the option -p."""
     text = text.replace("name it with -p", "enter it as Profile on Line")
     return text.replace("set by -p", "entered on Line")
 
 
 def _sentence(text: str, width: int) -> list[Text]:
-    """A sentence on as many rows as it takes; those about a drive follow its name."""
+    """Wrap a sentence; one about a drive is indented, since it follows the drive's name."""
     about_drive = text.startswith(" ")
     first = OF_A_DRIVE if about_drive else 1
     name = not about_drive and text.startswith(("Device", "Broadcast"))
@@ -60,7 +60,7 @@ def _sentence(text: str, width: int) -> list[Text]:
 
 
 class ListeningScreen(FrameListScreen):
-    """The frames of other masters and their drives; then who commands which, and how well."""
+    """Frames of other masters and their drives; the last page summarizes each drive."""
 
     CSS_PATH = "frames.tcss"
     BINDINGS: ClassVar = bindings(LISTENING)
@@ -74,24 +74,24 @@ class ListeningScreen(FrameListScreen):
         self._trouble_shown = False
 
     def sum_lines(self, width: int, height: int) -> list[Text]:
-        """Each drive: who commands it, how often it is asked, whether its timeout is fed."""
+        """Return the summary: each drive's master, poll rate, and timeout coverage."""
         lines, self._top = heard_lines(self._heard.summary(), width, height, self._top)
         return lines
 
     def _scroll_sum(self, lines: int) -> None:
-        """More drives than the screen has room for."""
+        """Scroll the summary; `sum_lines` limits the position."""
         self._top = max(0, self._top + lines)
         self.look()
 
     def draw(self, width: int) -> None:
-        """Say once that the line is gone."""
+        """Report once that listening has ended with an error."""
         if self._heard.trouble and not self._trouble_shown:
             self._trouble_shown, self._heading = True, "Listening has ended"
             self.app.notify(f"{self._heard.trouble} Press Esc to leave.", severity="error")
         super().draw(width)
 
     def _go_out(self) -> None:
-        """End listening; the port is given back before Line is there again."""
+        """End listening; the port is released before Line is shown."""
         self.run_worker(self._end(), exclusive=True, group="end")
 
     async def _end(self) -> None:
@@ -102,6 +102,6 @@ class ListeningScreen(FrameListScreen):
         super()._go_out()
 
     async def on_unmount(self) -> None:
-        """However one has left: nobody listens any more."""
+        """Release the port, however the screen was closed."""
         self.app.hearing = ""
         await asyncio.to_thread(self._heard.close)

@@ -1,4 +1,4 @@
-"""Registration of Frames, and of its mode for a line that is only monitored."""
+"""Registration of Frames, and of Listening, its mode for a line that is only monitored."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ LISTING = key_rows(
     ("scroll(-10)", "pageup", "", "Go back ten frames."),
     ("scroll(10)", "pagedown", "", "Go forward ten frames."),
 )
-"""Actions of both."""
+"""Actions of both Frames and Listening."""
 
 
 def create_frames(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
+    """Create Frames for the line of a drive; imports the screen at the first use."""
     from .screen import FramesScreen
 
     return FramesScreen(console)

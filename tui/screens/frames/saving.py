@@ -1,4 +1,4 @@
-"""Saving frames to a file whose name the person may change: for tshark, or as a text."""
+"""Saving of frames to a file, for tshark or as text; the user may change the file name."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ SAVED_AS = (
 
 
 class KeptFrames(NamedTuple):
-    """Frames to save, and what goes with them into a file."""
+    """Frames to save, with the other data that the file needs."""
 
     frames: Sequence[Frame]
     text: str
-    """All of them as a text."""
+    """All frames as text, for a text file."""
     line: str
     tcp: bool
     since_epoch: float
-    """Offset of a frame's time to seconds since 1970."""
+    """Seconds to add to a frame's time to get seconds since 1970."""
 
 
 def ask_where(app: Panel, kept: KeptFrames) -> None:
-    """Ask for the file, and save the frames in the form that its name asks for."""
+    """Ask for a file name, and save the frames; the ending sets the format."""
     from ..dialogs.ask import Ask, fault_of_new
 
     if not kept.frames:
@@ -67,9 +67,9 @@ def _save(app: Panel, path: Path, kept: KeptFrames) -> None:
 
 
 def save_frames(path: Path, kept: KeptFrames) -> int:
-    """Write frames to a new file; how many it holds. Raises OSError.
+    """Write frames to a new file, and return how many it has. Raises OSError, also if it exists.
 
-    Frames of Modbus TCP have no raw form.
+    Frames of Modbus TCP have no raw form and are always saved as Modbus/TCP.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.name.endswith(TEXT_NAME):

@@ -1,4 +1,4 @@
-"""Frames: what went over the line, in codes and values, as bytes, and counted."""
+"""Frames: traffic on the line of a drive, decoded, as bytes, and as counters."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from ..keys.table import bindings
 from .frame_list import FrameListScreen
 
 COUNTERS_EVERY, COUNTERS_SELDOM = 3.0, 10.0
-"""Seconds between two looks at the drive's own counters, and on a slow link."""
+"""Interval in seconds for reading the drive's own counters: normally, and on a slow link."""
 RESETS_NOTHING_ELSE = (
     "Function 8, sub-function 0A: the manual says that it only sets the drive's frame counters to"
     " 0. The motor continues unchanged. Other programs restart their comparison."
@@ -31,7 +31,7 @@ RESETS_NOTHING_ELSE = (
 
 
 class CounterKeys(PanelScreen):
-    """Keys of the page of counters."""
+    """Contents and keys of the counters page."""
 
     def __init__(self, console: DriveConsole) -> None:
         super().__init__()
@@ -40,17 +40,16 @@ class CounterKeys(PanelScreen):
         self._looking = False
 
     def on_mount(self) -> None:
-        """Look at the drive's own now and then, while they are shown."""
+        """Read the drive's own counters periodically while they are shown."""
         every = COUNTERS_SELDOM if self.app.low_bandwidth else COUNTERS_EVERY
         self.set_interval(every, self._begin_sum)
 
     @property
     def shows_counters(self) -> bool:
-        """True if the counters are shown now."""
+        """True while the counters page is shown."""
         raise NotImplementedError
 
     def sum_lines(self, width: int, height: int) -> list[Text]:
-        """The page as it is now."""
         from .counters_view import counters_lines
 
         session = self.session
@@ -58,7 +57,7 @@ class CounterKeys(PanelScreen):
         return counters_lines(self.console.counters.now(), who, width, height)
 
     def _begin_sum(self) -> None:
-        # one after the other: with a silent drive a look takes longer than the time between two
+        # one read at a time: from a silent drive, a read can take longer than the interval
         if self.shows_counters and self.is_current and not self._looking:
             self._looking = True
             self.run_worker(self._read_counters(), group="counters")
@@ -71,14 +70,14 @@ class CounterKeys(PanelScreen):
         self.look()
 
     def action_reset_counters(self) -> None:
-        """Count from now on; only what this panel shows."""
+        """Restart the counts of this panel; other programs keep theirs."""
         if self._require_shown():
             self.console.counters.reset_ours()
             self.app.tell("Counts restarted. The counts since the line was opened are kept.")
             self.look()
 
     def action_reset_drive_counters(self) -> None:
-        """Armed, ask; then set the drive's own counters to 0."""
+        """Set the drive's own counters to 0. Needs arming; asks first."""
         watch, device = self.console.counters, self.session.device
         if not self._require_shown():
             return
@@ -100,7 +99,7 @@ class CounterKeys(PanelScreen):
                 return
             try:
                 self.session.work.put(Task(self._reset_drive, owner=self.console), stamp)
-            except OrderRefused as refused:  # it is not armed any more, or was stopped since
+            except OrderRefused as refused:  # disarmed or stopped since the question
                 self.app.events.add("refused", f"Counters not reset: {refused}", device)
 
         requested = Confirm(
@@ -127,28 +126,26 @@ class CounterKeys(PanelScreen):
 
 
 class OwnFrames:
-    """The frames of a line of the panel, told by the drives that were found on it."""
+    """Frames of an open line, decoded with the profiles of the drives found on it."""
 
     def __init__(self, line: ModbusLine, app: Panel) -> None:
         self._line, self._app = line, app
 
     @property
     def link(self) -> Link:
-        """The line that they went over."""
         return self._line.link
 
     @property
     def frames(self) -> tuple[Frame, ...]:
-        """Those that went over it last."""
         return tuple(self._line.trace)
 
     def profile(self, device: int) -> Profile | None:
-        """That of a drive which was found."""
+        """Return the profile of a found drive; None for other addresses."""
         console = self._console(device)
         return console.session.profile if console else None
 
     def raws(self, device: int) -> Mapping[str, int]:
-        """Return the values read from a drive."""
+        """Return the raw values read from a found drive by code; empty for other addresses."""
         console = self._console(device)
         return console.session.image.raws if console else {}
 
@@ -157,17 +154,16 @@ class OwnFrames:
 
 
 class FramesScreen(CounterKeys, FrameListScreen):
-    """The frame log of the line of a drive; then the counters of that drive."""
+    """Frames on the line of a drive; the last page has the counters of that drive."""
 
     CSS_PATH = "frames.tcss"
     BINDINGS: ClassVar = bindings(FRAMES)
     TITLE = "Frames"
 
     def on_mount(self) -> None:
-        """The line is that of the drive."""
+        """Use the line of the drive as the source of frames."""
         self._source = OwnFrames(self.session.line, self.app)
 
     @property
     def shows_counters(self) -> bool:
-        """True if the counters replace the frames."""
         return self._shows_sum

@@ -1,1 +1,1 @@
-"""Monitor: the motor as it is, and the line that runs it."""
+"""Monitor screen: the motor's state, its curves, and the run line."""

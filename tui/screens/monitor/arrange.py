@@ -5,29 +5,29 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 OUTSIDE = 4
-"""Rows of the frame: strip, tabs, message, keys."""
+"""Rows of the frame: status bar, tabs, message, keys."""
 READOUT_ROWS = 5
-"""The upper edge with the name, three rows of digits, the lower edge with a bar."""
+"""Upper edge with the name, three rows of digits, lower edge with a bar."""
 ROOMY, VERY_ROOMY = 18, 30
-"""Rows between tabs and message from which words have two rows, and from which values have more."""
+"""Least rows within the frame for a second row at the bottom, and for a third."""
 WIDE = 110
-"""Columns from which there is a third readout, and tables of bits are side by side."""
+"""Least terminal columns for a third readout, and for tables of bits side by side."""
 VALUE_COLUMN, WIDE_VALUE_COLUMN = 19, 26
-"""Cells of a value: its name, its number, its unit."""
+"""Least cells of a value with name, number and unit: below WIDE, and from WIDE on."""
 VALUE_ROWS_MOST = 3
 STATE_WIDTH, STATE_WIDTH_MOST = 29, 44
 AXIS_ROWS, SHORT_AXIS_ROWS = 2, 1
-"""Rows below the curve: marks and clock times, which share one row if there are few."""
+"""Rows below the curve for marks and clock times; a short axis has both in one row."""
 SHORT_CURVE = 6
-"""Rows of the part of the curve up to which its axis is short."""
+"""Most rows of a curve, with heading and axis, that has a short axis."""
 BAND_FROM = 14
-"""Rows of curves from which the current has a band of its own."""
+"""Least rows of curves for a separate band of the current."""
 BAND_LEAST, BAND_MOST = 3, 10
 
 
 @dataclass(frozen=True, slots=True)
 class Arrangement:
-    """Rows of the parts, from the top."""
+    """Rows and columns of Monitor's parts, from the top."""
 
     width: int
     height: int
@@ -36,10 +36,10 @@ class Arrangement:
     columns: int
     """Columns of values."""
     curve: int
-    """The curve with its heading and axis, or a table in its place."""
+    """Rows of the curve with its heading and axis, or of a table instead of it."""
     bottom: int
     lean: bool = False
-    """True if as little as possible is sent: no third readout, no second curve."""
+    """True on a low-bandwidth link: no third readout and no second curve."""
 
     @property
     def wide(self) -> bool:
@@ -48,7 +48,7 @@ class Arrangement:
 
     @property
     def third(self) -> bool:
-        """True if there is a third readout."""
+        """True if the terminal is wide enough for a third readout, and the link fast enough."""
         return self.wide and not self.lean
 
     @property
@@ -58,17 +58,17 @@ class Arrangement:
 
     @property
     def state_width(self) -> int:
-        """Columns of the block at the right."""
+        """Columns of the state block at the right, with its frame."""
         return STATE_WIDTH if self.width < 100 else min(STATE_WIDTH_MOST, self.width * 2 // 7)
 
     @property
     def axis(self) -> int:
-        """Rows of the axis."""
+        """Rows of the time axis."""
         return SHORT_AXIS_ROWS if self.curve <= SHORT_CURVE else AXIS_ROWS
 
     @property
     def band(self) -> int:
-        """Rows of the band of the current, without the line above it; 0 for none."""
+        """Rows of the current's band, without the line above it; 0 if there is no band."""
         rows = self.curve - 1 - self.axis
         return (
             max(BAND_LEAST, min(BAND_MOST, rows // 4)) if rows >= BAND_FROM and not self.lean else 0
@@ -76,15 +76,15 @@ class Arrangement:
 
     @property
     def plot(self) -> int:
-        """Rows of the first curve."""
+        """Rows of the first curve, without heading and axis."""
         band = self.band
         return self.curve - 1 - self.axis - (band + 1 if band else 0)
 
 
 def arrange(width: int, height: int, count: int, *, lean: bool = False) -> Arrangement:
-    """The parts in a terminal of that size, for a drive with so many values.
+    """Divide the terminal among the parts, for a drive with `count` values outside the readouts.
 
-    The curve gets the rows that the others leave.
+    The curve gets the remaining rows.
     """
     room = height - OUTSIDE
     very = room >= VERY_ROOMY

@@ -1,4 +1,4 @@
-"""All lines of Monitor, by their place; pure functions of a view."""
+"""Rows of all parts of Monitor; pure functions of a view."""
 
 from __future__ import annotations
 
@@ -31,11 +31,14 @@ from .words import (
 
 NOTICE_ROWS = 2
 HELD = 0.9
-"""Share of the wished rate from which on it counts as held."""
+"""Least share of the requested poll rate that counts as reached."""
 
 
 def notice_lines(view: View, width: int) -> list[Text]:
-    """The one notice that matters most now, on at most two lines; none while there is nothing."""
+    """Return the most important notice in at most two rows.
+
+    The list is empty without a notice, in a fault, and while values are not current.
+    """
     if view.snapshot is None or view.lost or view.snapshot.state.kind == "fault":
         return []
     control = view.control
@@ -52,7 +55,7 @@ def notice_lines(view: View, width: int) -> list[Text]:
 
 
 def line_figures(view: View) -> Text:
-    """Return the read rate of the drive, and the block that returns its values."""
+    """Return the poll rate in cycles per second, and the block that carries the values."""
     rate = view.snapshot.rate if view.snapshot and not view.lost else 0.0
     wished = 1 / view.period
     held = rate > HELD * wished or not rate
@@ -68,14 +71,17 @@ def line_figures(view: View) -> Text:
 
 Parts = dict[str, list[Text]]
 WORD_WIDTH = 30
-"""Least cells of a table of bits beside another."""
+"""Least cells of each table of bits, if several are side by side."""
 NEXT_CELLS = 12
 WordTable = tuple[WordPage, ...]
-"""Words that Tab shows together, with all their bits; no word stands for the values."""
+"""Pages of bits that Tab shows together; empty for the table of all values."""
 
 
 def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
-    """Return the lines of each place, in exactly its number of rows."""
+    """Return the rows of each part, by its widget ID.
+
+    Each part has exactly its number of rows; a notice may add some to the message.
+    """
     lead = [Text("")] * room.lead
     readouts = readout_lines(view, room.width - room.state_width - 1, wide=room.third)
     return {
@@ -88,7 +94,7 @@ def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> 
 
 
 def framed_state(view: View, width: int) -> list[Text]:
-    """The state with who commands, in a frame; the line's answers are in its lower edge."""
+    """Return the framed state block, with the line's answers in its lower edge."""
     head, *rows = state_lines(view, width - 4)
     right = Text(" ").append_text(head).append(" ")
     title = Text(" State ", FAINT)
@@ -100,7 +106,7 @@ def framed_state(view: View, width: int) -> list[Text]:
 
 
 def curve_or_table(view: View, room: Arrangement, words: Sequence[Parameter]) -> list[Text]:
-    """The curve, or in its place all values, or words with all their bits."""
+    """Return the curve, or the table that Tab shows instead."""
     found = tables(view.profile, room, words)
     if view.word is None or view.word >= len(found):
         return curve_lines(view, room)
@@ -108,7 +114,7 @@ def curve_or_table(view: View, room: Arrangement, words: Sequence[Parameter]) ->
 
 
 def tables(profile: Profile, room: Arrangement, words: Sequence[Parameter]) -> list[WordTable]:
-    """Return the tables that Tab shows one after the other."""
+    """Return the tables in the order of Tab; all values are first if some do not fit above."""
     values = other_values(profile, wide=room.third)
     found: list[WordTable] = [()] if len(values) > room.values * room.columns else []
     if not room.wide:
@@ -119,7 +125,7 @@ def tables(profile: Profile, room: Arrangement, words: Sequence[Parameter]) -> l
 
 
 def _table_lines(view: View, room: Arrangement, table: WordTable) -> list[Text]:
-    """A table in exactly the rows of the curve."""
+    """Return a table in exactly the rows of the curve."""
     width = room.width - 1
     following = Text.assemble(("  Tab", KEY), (" next", FAINT))
     if not table:
@@ -141,9 +147,9 @@ def _table_lines(view: View, room: Arrangement, table: WordTable) -> list[Text]:
 
 
 def bottom_lines(view: View, room: Arrangement, words: Sequence[Parameter]) -> list[Text]:
-    """Notices, the lit bits of a word or two, the alarms; what is lowest is dropped last.
+    """Return notices, the set bits of up to two words, and the alarms in the last row.
 
-    A notice that needs more rows gets them.
+    In a single row a notice takes precedence, then an alarm. A long notice gets more rows.
     """
     notices = notice_lines(view, room.width)
     figures = line_figures(view) if room.wide else Text("")
@@ -158,7 +164,7 @@ def bottom_lines(view: View, room: Arrangement, words: Sequence[Parameter]) -> l
 
 
 def watched_words(profile: Profile) -> list[Parameter]:
-    """Words with named bits: the monitoring set's, then inputs and outputs."""
+    """Return the words with named bits: the status word, the monitoring set's, inputs, outputs."""
     watched = [profile[v.parameter] for v in profile.data.monitoring.values]
     found = [parameter for parameter in watched if parameter.bits]
     for quantity in ("digital_inputs", "digital_outputs"):
@@ -169,7 +175,7 @@ def watched_words(profile: Profile) -> list[Parameter]:
 
 
 def codes_beside(profile: Profile) -> list[str]:
-    """Return the slowly read codes: ends of bars, channels, inputs and outputs."""
+    """Return the codes to read slowly: ends of bars, channels, and words with named bits."""
     codes = [v.high for v in profile.data.monitoring.values if profile.get(v.high)]
     for quantity in ("command_channel", "reference_channel"):
         parameter = profile.quantity(quantity)

@@ -1,4 +1,4 @@
-"""The curves of frequency and current with their axes, marks and cursor; pure functions."""
+"""Curves of frequency and current with their axes, marks and cursor; pure functions."""
 
 from __future__ import annotations
 
@@ -53,7 +53,7 @@ from .view import View, decimal_places, directed, end_of
 
 LABEL_CELLS = 5
 MARGIN_CELLS = 7
-"""Cells after a curve for the present value."""
+"""Cells at the right of a curve for the latest value."""
 REFERENCE_STYLE = Style(color=KEY.color)
 NAMES: dict[Quantity, str] = {"output_frequency": "output", "motor_current": "current"}
 MARK_SIGNS: dict[TrendMark, tuple[str, Style, str]] = {
@@ -69,7 +69,7 @@ MARK_SIGNS: dict[TrendMark, tuple[str, Style, str]] = {
 
 
 class ShownPage(NamedTuple):
-    """The page of time that is drawn, with what all its parts need."""
+    """Displayed page of time, with the data that its parts share."""
 
     view: View
     points: Sequence[TrendPoint]
@@ -78,7 +78,7 @@ class ShownPage(NamedTuple):
     marks: dict[int, TrendMark]
 
     def plot(self, rows: int, scale: CurveScale) -> Plot:
-        """Return a plot of the page."""
+        """Return a plot of the page with `rows` rows and a vertical scale."""
         return _plot(self.view, self.columns, rows, scale)
 
 
@@ -88,11 +88,11 @@ class Band(NamedTuple):
     quantity: Quantity
     parameter: Parameter
     place: int
-    """Its place among the values of a point."""
+    """Index of the quantity in `TrendPoint.values`."""
 
 
 def bands(view: View) -> list[Band]:
-    """Return the quantities that have a curve, the first for the large plot."""
+    """Return the quantities with a curve; the first has the large plot."""
     found = []
     for place, quantity in enumerate(TREND_QUANTITIES):
         parameter = readout_parameter(view.profile, quantity)
@@ -102,7 +102,7 @@ def bands(view: View) -> list[Band]:
 
 
 def curve_lines(view: View, room: Arrangement) -> list[Text]:
-    """The heading, the curves and the axis of time, in exactly the rows of the part."""
+    """Return the heading, the curves and the time axis, in exactly the rows of the part."""
     found = bands(view)
     if not found:
         nothing = Text("  No curve: no document says where output and current are.", FAINT)
@@ -124,7 +124,7 @@ def _plot(view: View, columns: int, rows: int, scale: CurveScale) -> Plot:
 
 
 def samples_of(points: Sequence[TrendPoint], place: int) -> Samples:
-    """Return the values at a place of each point, with their times."""
+    """Return the value at index `place` of each point, with its time."""
     return [(point.time, point.values[place]) for point in points]
 
 
@@ -141,7 +141,7 @@ def _time(point: TrendPoint) -> float:
 
 
 def reach_of(view: View) -> float:
-    """Return the longest time in s between two values that are connected."""
+    """Return the longest gap, in seconds, across which two values are connected."""
     return STALE_CYCLES * view.cycle
 
 
@@ -182,7 +182,7 @@ def _has_reference(view: View) -> bool:
 
 
 def _present(view: View, band: Band) -> tuple[float, str] | None:
-    """Return the current value with its text; None if it is old or missing."""
+    """Return the latest value with its text; None if it is old, or while the cursor is open."""
     reading = view.reading(band.parameter.code)
     number = reading.current_number if reading is not None else None
     if reading is None or number is None or view.page is not None:
@@ -196,7 +196,10 @@ def _present(view: View, band: Band) -> tuple[float, str] | None:
 
 
 def _scale(view: View, band: Band, curves: Sequence[Curve], rows: int) -> CurveScale:
-    """Return the scale: to the end of the value's bar, or to the next round number above all."""
+    """Return the scale, which is symmetric if any value is negative.
+
+    It ends at the end of the value's bar, or at a round number above any higher value.
+    """
     seen = [abs(value) for curve in curves for _, value in curve.samples if value is not None]
     highest = max(seen, default=0.0)
     end = bar_end(view, band.parameter, band.place)
@@ -208,7 +211,7 @@ def _scale(view: View, band: Band, curves: Sequence[Curve], rows: int) -> CurveS
 
 
 def bar_end(view: View, parameter: Parameter, place: int) -> float | None:
-    """Return the end of a value's bar; if the profile has none, a round number above all seen."""
+    """Return the end of a value's bar; if the profile has none, a round number above the trend."""
     for value in view.values:
         if value.parameter == parameter.code and (end := end_of(view, value.high)):
             return end if end > 0 else None
@@ -219,7 +222,7 @@ def bar_end(view: View, parameter: Parameter, place: int) -> float | None:
 
 
 def _marks(view: View, points: Sequence[TrendPoint], columns: int) -> dict[int, TrendMark]:
-    """Return the marks of the page by column, the most urgent of each."""
+    """Return the most urgent mark of each column of the page."""
     plot = _plot(view, columns, 1, CurveScale(0, 1))
     found: dict[int, TrendMark] = {}
     for point in points:
@@ -240,7 +243,7 @@ def _ticks(page: ShownPage) -> list[tuple[int, float]]:
     found = []
     for number in range(round(view.step.span / tick) + 1):
         wall = first + number * tick
-        # half a column later: the floating point error of the clock moves no tick
+        # a thousandth of a column later, so that rounding errors move no tick
         column = plot.column(wall - view.apart + view.step.span / page.columns / 1000)
         if column is not None:
             found.append((column, wall))
@@ -248,7 +251,7 @@ def _ticks(page: ShownPage) -> list[tuple[int, float]]:
 
 
 def _axis(page: ShownPage, rows: int) -> list[Text]:
-    """The axis, drawn up to now, with the marks; below it clock times."""
+    """Return the time axis up to now with its marks, and the clock times below or on it."""
     view, columns, plot = page.view, page.columns, page.plot(1, CurveScale(0, 1))
     ticks = _ticks(page)
     reached = plot.column(view.now) if view.now < plot.end else columns
@@ -276,11 +279,11 @@ def _axis(page: ShownPage, rows: int) -> list[Text]:
 
 
 FULL_CELLS = 10
-"""Columns of a tick from which its clock time is written in full."""
+"""Least columns between two ticks for clock times in full."""
 
 
 def _clock_times(view: View, ticks: Sequence[tuple[int, float]], columns: int) -> str:
-    """Return the line of clock times below the ticks."""
+    """Return the row of clock times, centered on their ticks; times that overlap are omitted."""
     cells = [" "] * (columns + MARGIN_CELLS)
     apart = columns * view.step.tick / view.step.span
     end = 0
@@ -302,7 +305,7 @@ def _clock_times(view: View, ticks: Sequence[tuple[int, float]], columns: int) -
 
 
 def _between(band: Band, page: ShownPage) -> Text:
-    """The line above the second band, with its name."""
+    """Return the line above the second band, with its unit and name."""
     unit = short(band.parameter.unit or "raw", LABEL_CELLS - 1)
     text = Text(f" {unit:<{LABEL_CELLS - 1}}", FAINT, no_wrap=True).append("├─ ", LINE)
     text.append_text(_sample("⠒⠒", BAR, page.view)).append(f" {NAMES[band.quantity]} ", FAINT)
@@ -310,7 +313,7 @@ def _between(band: Band, page: ShownPage) -> Text:
 
 
 def _heading(view: View, band: Band, marks: dict[int, TrendMark], width: int) -> Text:
-    """The names of curves and marks; with the cursor, the values at its moment."""
+    """Return the names of curves and marks; while the cursor is open, the values there."""
     if view.cursor is not None:
         return _read_out(view, view.cursor, width)
     unit = band.parameter.unit or "raw"
@@ -331,7 +334,7 @@ def _heading(view: View, band: Band, marks: dict[int, TrendMark], width: int) ->
 
 
 def _sample(dots: str, style: Style, view: View) -> Text:
-    """Two cells of a curve, as this terminal draws them."""
+    """Return two cells of a curve for the legend, in the signs of this terminal."""
     if view.plain:
         dots = "--" if dots == "⠒⠒" else "= "
     elif not view.braille:
@@ -340,7 +343,7 @@ def _sample(dots: str, style: Style, view: View) -> Text:
 
 
 def _read_out(view: View, moment: float, width: int) -> Text:
-    """The values at the moment of the cursor, with the time at which they were read."""
+    """Return the values at the moment of the cursor, with the time at which they were read."""
     text = Text(no_wrap=True)
     found, points = None, points_of_page(view)
     for place, quantity in enumerate(TREND_QUANTITIES):
@@ -370,11 +373,11 @@ def _read_out(view: View, moment: float, width: int) -> Text:
 
 
 def clock_text(wall: float) -> str:
-    """A time of day to the tenth of a second, cut and not rounded."""
+    """Return the local time of day, truncated to tenths; `wall` is in seconds since 1970."""
     tenths = math.floor(wall * 10 + 1e-6)
     return f"{time.strftime('%H:%M:%S', time.localtime(tenths // 10))}.{tenths % 10}"
 
 
 def span_text(seconds: float) -> str:
-    """A page of time as a person reads it."""
+    """Return a span in seconds, or in minutes from 120 s on."""
     return f"{seconds:g} s" if seconds < 120 else f"{seconds / 60:g} min"

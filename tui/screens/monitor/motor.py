@@ -1,4 +1,4 @@
-"""The other values of the monitoring set, in columns; pure functions of a view."""
+"""Other values of the monitoring set, in columns; pure functions of a view."""
 
 from __future__ import annotations
 
@@ -54,16 +54,16 @@ IN_READOUTS: frozenset[Quantity] = frozenset(
 )
 UNIT_CELLS, NUMBER_CELLS, SHORT_NUMBER_CELLS = 3, 7, 6
 SHORT_FROM = 22
-"""Cells of a column below which labels and numbers are short."""
+"""Least cells of a column for full labels and numbers."""
 VALUE_CELLS = 24
-"""Cells of a value beside its bar."""
+"""Cells of a value that has a bar after it."""
 VALUE_CELLS_MOST = 30
 BAR_CELLS, END_CELLS = 8, 4
 
 
 @lru_cache(maxsize=16)
 def other_values(profile: Profile, *, wide: bool = False) -> Sequence[MonitoringValue]:
-    """The values beside the readouts, in the profile's order."""
+    """Return the values of the monitoring set without a readout, in the profile's order."""
     found = (readout_parameter(profile, q) for q in readout_quantities(profile, wide=wide))
     shown = {parameter.code for parameter in found if parameter is not None}
     values = profile.data.monitoring.values
@@ -86,7 +86,7 @@ def _is_other(profile: Profile, value: MonitoringValue) -> bool:
 def motor_lines(
     view: View, width: int, rows: int, columns: int, *, wide: bool = False
 ) -> list[Text]:
-    """The values row by row, as many as fit; the table on Tab has the others."""
+    """Return the values column by column, as many as fit. Tab shows the others."""
     values = other_values(view.profile, wide=wide)[: rows * columns]
     cells = (width - 1) // columns
     barred = any(value.high for value in values)
@@ -99,7 +99,7 @@ def motor_lines(
 
 
 def value_cells(cells: int, barred: bool) -> int:
-    """Return the width of a column with name, number and unit in cells."""
+    """Return the cells for name, number and unit in a column of `cells` cells."""
     with_bar = VALUE_CELLS + 2 + BAR_CELLS + END_CELLS
     return VALUE_CELLS if barred and cells >= with_bar else min(cells - 2, VALUE_CELLS_MOST)
 
@@ -107,7 +107,7 @@ def value_cells(cells: int, barred: bool) -> int:
 def value_labels(
     profile: Profile, values: Sequence[MonitoringValue], cells: int, barred: bool
 ) -> list[str]:
-    """Return the names of values with their marks, in the cells of a column and no two alike."""
+    """Return distinct names of values with their marks, padded to fit a column of `cells` cells."""
     numbers = SHORT_NUMBER_CELLS if cells < SHORT_FROM else NUMBER_CELLS
     room = value_cells(cells, barred) - numbers - UNIT_CELLS - 1
     parameters = [profile[value.parameter] for value in values]
@@ -118,7 +118,7 @@ def value_labels(
 
 
 def _value(view: View, value: MonitoringValue, label: str, cells: int, barred: bool) -> Text:
-    """Its name, its number to the right, its unit; behind it a bar where there is room."""
+    """Return name, number and unit of a value, followed by a bar if there is room."""
     parameter = view.profile[value.parameter]
     columns = value_cells(cells, barred)
     numbers = SHORT_NUMBER_CELLS if cells < SHORT_FROM else NUMBER_CELLS
@@ -149,7 +149,7 @@ def _value(view: View, value: MonitoringValue, label: str, cells: int, barred: b
 
 
 def _label(parameter: Parameter, *, is_short: bool) -> str:
-    """The name of a value."""
+    """Return the label of a quantity; any other value has the name of its parameter."""
     if parameter.quantity is None:
         return parameter.name
     full = LABELS.get(parameter.quantity, parameter.name)

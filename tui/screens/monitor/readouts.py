@@ -1,6 +1,6 @@
-"""The large readouts: output frequency, motor current, and one more if there is room.
+"""Large readouts: output frequency, motor current, and one more if there is room.
 
-Each is framed, with its name and unit, its extremes on the page of the curve, and a bar. Pure
+Each has a frame with its name and unit, its extremes on the page of the curve, and a bar. Pure
 functions of a view.
 """
 
@@ -26,9 +26,9 @@ from .curves import bar_end, points_of_page, span_text
 from .view import View, bar_number, decimal_places, directed, end_of
 
 SIGN_CELLS = 5
-"""Cells that the frequency has more than the others, for its sign and a third digit."""
+"""Extra cells of the frequency's readout, for its sign and a third digit."""
 SIDE_CELLS = 9
-"""Cells of the extremes beside the digits: a name and a number."""
+"""Cells of the extremes at the right of the digits: a name and a number."""
 READOUT_MOST = 60
 TITLES: dict[Quantity, str] = {
     "output_frequency": "Output",
@@ -38,12 +38,12 @@ TITLES: dict[Quantity, str] = {
     "motor_load": "Motor load",
 }
 THIRD: Sequence[Quantity] = ("torque", "power", "motor_load")
-"""Quantities of the third readout, the first that the drive has."""
+"""Candidates for the third readout; the first in the monitoring set is shown."""
 
 
 @lru_cache(maxsize=16)
 def readout_quantities(profile: Profile, *, wide: bool) -> tuple[Quantity, ...]:
-    """Return the quantities that have a large readout."""
+    """Return the quantities with a large readout; `wide` adds a third if it is monitored."""
     found: list[Quantity] = ["output_frequency", "motor_current"]
     watched = {value.parameter for value in profile.data.monitoring.values}
     if wide:
@@ -55,7 +55,7 @@ def readout_quantities(profile: Profile, *, wide: bool) -> tuple[Quantity, ...]:
 
 
 def readout_lines(view: View, width: int, *, wide: bool = False) -> list[Text]:
-    """The readouts side by side, each row of exactly so many cells."""
+    """Return the readouts side by side; each row has exactly `width` cells."""
     quantities = readout_quantities(view.profile, wide=wide)
     cells = (width - len(quantities) + 1 - SIGN_CELLS) // len(quantities)
     rows = [Text(no_wrap=True) for _ in range(ROWS + 2)]
@@ -71,7 +71,10 @@ def readout_lines(view: View, width: int, *, wide: bool = False) -> list[Text]:
 
 
 def framed(title: Text, right: Text, rows: Sequence[Text], bottom: Text, cells: int) -> list[Text]:
-    """Rows in a frame of exactly so many cells, with texts in its upper and lower edge."""
+    """Return rows in a frame of exactly `cells` cells, with texts in its upper and lower edge.
+
+    The right text is omitted if it does not fit.
+    """
     inner = cells - 2
     title = title.copy()
     title.truncate(inner)
@@ -94,7 +97,7 @@ def _filled(row: Text, cells: int, character: str) -> Text:
 
 
 def _readout(view: View, quantity: Quantity, cells: int) -> list[Text]:
-    """One readout, each row of exactly so many cells."""
+    """Return one readout; each row has exactly `cells` cells."""
     parameter = readout_parameter(view.profile, quantity)
     text, unit, style = _shown(view, quantity, parameter)
     inner = cells - 2
@@ -113,7 +116,7 @@ def _readout(view: View, quantity: Quantity, cells: int) -> list[Text]:
 
 
 def _shown(view: View, quantity: Quantity, parameter: Parameter | None) -> tuple[str, str, Style]:
-    """Text, unit and style of the value."""
+    """Return text, unit and style of the value."""
     reading = view.reading(parameter.code) if parameter else None
     none = (NOT_AVAILABLE, parameter.unit if parameter else "", FAINT)
     if parameter is None or reading is None:
@@ -127,25 +130,25 @@ def _shown(view: View, quantity: Quantity, parameter: Parameter | None) -> tuple
     return reading.drawn(
         view.now,
         current=lambda value: (signed(value), value.unit or "raw", STRONG),
-        old=lambda value, age: (signed(value), value.unit or "raw", FAINT),  # the heading has it
+        old=lambda value, age: (signed(value), value.unit or "raw", FAINT),  # age: in _heading
         missing=none,
     )
 
 
 def _field(parameter: Parameter | None, quantity: Quantity) -> int:
-    """The width of the digits: the same for every value of a parameter."""
+    """Return the cells of the digits, which are the same for every value of a parameter."""
     signed = quantity != "motor_current"
     if parameter is None or not parameter.unit:
         return readout_cells(0, signed=signed, whole=5)
     decimals = decimal_places(parameter)
-    # a current of 100 A and more loses its decimal, which the status bar shows
+    # a current of 100 A or more loses its decimal here; the status bar shows it
     return readout_cells(decimals, signed=signed, whole=3 if signed or not decimals else 2)
 
 
 def _heading(
     view: View, quantity: Quantity, parameter: Parameter | None, unit: str, inner: int
 ) -> tuple[Text, Text]:
-    """The name with the unit; at the right the reference, or the age of an old value."""
+    """Return the name with the unit, and at the right the reference or the age of an old value."""
     title = TITLES[quantity]
     if parameter is not None and (mark := mark_of(view.profile, parameter)):
         title += f" {mark}"
@@ -167,7 +170,7 @@ def _heading(
 
 
 def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[Text]:
-    """The extremes on the page of the curve; nothing if the value is not kept."""
+    """Return the extremes on the page of the curve; empty rows if the trend lacks the quantity."""
     if quantity not in TREND_QUANTITIES or parameter is None:
         return [Text()] * ROWS
     place = TREND_QUANTITIES.index(quantity)
@@ -188,14 +191,14 @@ def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[T
 
 
 def _reference(view: View) -> Shown | None:
-    """The reference, where it is known now."""
+    """Return the reference; None if its current value is not known."""
     parameter = view.profile.quantity("frequency_reference")
     reading = view.reading(parameter.code) if parameter else None
     return reading if reading is not None and reading.current_number is not None else None
 
 
 def _bar(view: View, quantity: Quantity, parameter: Parameter | None, inner: int) -> Text:
-    """The value between its limits, the reference as a mark, the ends as numbers."""
+    """Return a bar of the value, with its limits as numbers and the reference as a mark."""
     value = next((v for v in view.values if parameter and v.parameter == parameter.code), None)
     if parameter is None or value is None:
         return Text("")

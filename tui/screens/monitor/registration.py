@@ -1,4 +1,4 @@
-"""Registration of Monitor, and of the screen that is shown until its drive is known."""
+"""Registration of Monitor, and of the screen shown until its drive is known."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ COMMAND_ACTIONS = (
 
 
 def create_monitor(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
+    """Create Monitor for a drive; the import waits until the screen is needed."""
     from .screen import MonitorScreen
 
     return MonitorScreen(console)

@@ -1,4 +1,4 @@
-"""Keys of the line that runs a motor, and of the inputs of a simulated drive."""
+"""Keys of the run line, and of the inputs of a simulated drive."""
 
 from __future__ import annotations
 
@@ -25,20 +25,23 @@ from ..keys.table import ACTIONS
 from .run_line import STEPS, Purpose, RunLine, limits, proposed, run_lines
 
 OTHER_STOP_KEYS = frozenset(item.keys for item in ACTIONS if item.id.startswith("stop_as("))
-"""Keys that stop in a way of their own, at once."""
+"""Keys of other stops, such as quick stop; they act immediately."""
 
 ENTER_TOO_EARLY = "Enter ignored: it came before the line could be read. Press it again."
 
 
 class RunKeys(OrderKeys):
-    """Nothing turns on one letter: r, v and f open a line, and Enter does what it says."""
+    """Keys of the run line: r, v and f only open it, so no letter alone starts a motor."""
 
     _line: RunLine | None = None
     _around: Mapping[str, Shown] | None = None
-    """Facts beside the reference: limits and ramp."""
+    """Readings of the limits and the ramp, by code; None until they are read."""
 
     def action_run_line(self, purpose: Purpose) -> None:
-        """Open the line, where the drive is armed and a command can have an effect."""
+        """Open the run line if the drive is armed.
+
+        Refuse a reference if the profile has no parameter for it.
+        """
         if not self._require_armed():
             return
         profile, image = self.session.profile, self.session.image
@@ -54,7 +57,7 @@ class RunKeys(OrderKeys):
         self.look()
 
     async def _read_around(self) -> None:
-        """The limits of a reference, and the ramp."""
+        """Read the limits of the reference and the ramp times; ignore line errors."""
         profile = self.session.profile
         codes = reference_codes(profile)
         ramps = (profile.quantity("acceleration"), profile.quantity("deceleration"))
@@ -62,26 +65,26 @@ class RunKeys(OrderKeys):
         try:
             self._around = await self.console.read(codes)
         except LineError:
-            return  # the line shows what is known; Enter reads anew
+            return  # the line shows known values; Enter reads them again
         self.look()
 
     @property
     def line_is_open(self) -> bool:
-        """True if keys are those of the line."""
+        """True while keys act on the run line."""
         return self._line is not None
 
     @property
     def takes_letters(self) -> bool:
-        """True if the line takes them."""
+        """True while the run line, a dialog or a field accepts characters."""
         return self.line_is_open or super().takes_letters
 
     def run_line_lines(self, now: float, width: int) -> list[Text] | None:
-        """The line and its keys; None while it is closed."""
+        """Return the rows of the run line, in `width` cells; None while it is closed."""
         line = self._line
         if line is None:
             return None
         if line.stamp != self.session.work.stops or not self._armed():
-            self._line = None  # a stop, or the end of arming, has closed it
+            self._line = None  # a stop or disarming closes the line
             return None
         found = hindrance(self.session.profile, self.session.image.raws)
         reported = f"{found.text} {_after_esc(found.way)}" if found else ""
@@ -89,7 +92,7 @@ class RunKeys(OrderKeys):
         return run_lines(line, self.session.profile, around, now, width, reported, output)
 
     def run_line_keys(self, now: float) -> Text:
-        """The keys that mean something while the line is open."""
+        """Return the keys that work while the line is open; Enter is dim until it counts."""
         line = self._line
         does = "set" if line is not None and line.purpose == "reference" else "run"
         counts = line is not None and line.counts(now)
@@ -101,7 +104,10 @@ class RunKeys(OrderKeys):
         return key_line([*keys, ("close", "Esc", "cancel")], styles)
 
     def on_key(self, event: Key) -> None:
-        """While the line is open every key but a stop's is the line's; an unknown one closes it."""
+        """Handle keys of the open line; an unknown key closes it.
+
+        Stop keys close the line too, but act as usual.
+        """
         if self._line is None:
             super().on_key(event)
             return
@@ -109,7 +115,7 @@ class RunKeys(OrderKeys):
         self._line = None
         if key in OTHER_STOP_KEYS:
             self.look()
-            return  # never swallowed: what stops, stops here too
+            return  # not consumed: a stop key acts here too
         event.stop()
         event.prevent_default()
         if key in STEPS and line.unit:
@@ -129,7 +135,10 @@ class RunKeys(OrderKeys):
         self.look()
 
     def _entered(self, line: RunLine, event: Key) -> RunLine | None:
-        """Do what the line says; it stays where that cannot be meant, or is wrong."""
+        """Give the command of the line and return None, which closes the line.
+
+        Return the line if Enter came too early or in a burst, or if the reference is wrong.
+        """
         if not line.counts(self.app.clock.monotonic()) or not _alone(event):
             self.app.tell(ENTER_TOO_EARLY)
             return line
@@ -145,11 +154,11 @@ class RunKeys(OrderKeys):
 
     @property
     def takes_text(self) -> bool:
-        """True if digits that come at once may be typed: while the line is open."""
+        """True while the line is open: digits that arrive together may be typed text."""
         return self._line is not None
 
     def action_step_reference(self, steps: int) -> None:
-        """Raise or lower the reference; where that would start the motor, open the line."""
+        """Raise or lower the reference; if that would start the motor, open the line instead."""
         if self._would_start() and self._armed():
             self.action_run_line("reference")
             if self._line is not None:
@@ -160,12 +169,12 @@ class RunKeys(OrderKeys):
         super().action_step_reference(steps)
 
     def _would_start(self) -> bool:
-        """Return True if the drive is enabled at 0 Hz: a reference turns the motor."""
+        """Return True if the drive is enabled at 0 Hz, so that a reference turns the motor."""
         latest = self.console.latest
         return latest is not None and latest.state.motion == "running" and self._output() == 0
 
     def _output(self) -> Decimal | None:
-        """The present output frequency, below 0 in reverse; None where it is not known."""
+        """Return the last known output frequency in Hz, negative in reverse, or None."""
         latest, frequency = self.console.latest, self.session.profile.quantity("output_frequency")
         if latest is None or frequency is None:
             return None
@@ -182,18 +191,18 @@ class RunKeys(OrderKeys):
 
 
 def _after_esc(way: str) -> str:
-    """The remedy by a key, which works once the run line is closed."""
+    """Prefix a remedy that names a key with Esc: the key works once the run line is closed."""
     return way.replace("Press ", "Press Esc, then ", 1) if way.startswith("Press ") else way
 
 
 def _alone(event: Key) -> bool:
-    """Return True if a key was pressed alone; one that no terminal has sent was."""
+    """Return True if no other key arrived with this key, or if no terminal sent it."""
     stroke = stroke_of(event)
     return stroke is None or stroke.alone
 
 
 def _steps(event: Key) -> bool:
-    """Return True if an arrow counts: of several that came at once only the first does."""
+    """Return True if an arrow steps the reference: in a burst only the first does."""
     stroke = stroke_of(event)
     return stroke is None or stroke.steps
 
@@ -203,10 +212,10 @@ LOOKS_LIKE = "LI1=1,AI1=5V: logic inputs 1 or 0, analog 5V, 12mA, 50%."
 
 
 class InputKeys(RunKeys):
-    """Keys that set the inputs of a simulated drive by a text."""
+    """Key that sets the inputs of a simulated drive."""
 
     def action_inputs(self) -> None:
-        """Ask for inputs and set them; a real line has none that can be set from here."""
+        """Prompt for the inputs of a simulated drive and set them; refuse on a real line."""
         simulation = self.app.opened.simulation if self.app.opened else None
         if simulation is None:
             self.app.notify(NOT_SIMULATED, severity="warning")

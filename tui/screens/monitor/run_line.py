@@ -1,4 +1,4 @@
-"""The line that runs a motor or gives it a reference: what is typed, and what Enter will do."""
+"""Run line, which runs a motor or sets its reference: its contents, checks and rows."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ STEPS: Mapping[str, Decimal] = {
     "pageup": Decimal(5),
     "pagedown": Decimal(-5),
 }
-"""By key, the step of a reference: in its unit, rpm in tens."""
+"""Steps of a reference by key: in its unit, or in tens of rpm."""
 DIGITS_MOST = 7
 AT_ZERO = "At 0 the motor would not turn: type a reference, then Enter."
 GROUND_OF_LINE = Style(bgcolor=SURFACE)
@@ -50,7 +50,7 @@ BEFORE_RAMP: Mapping[str, Quantity] = {
     "command_frequency": "frequency_reference",
     "command_speed": "speed_reference",
 }
-"""By where a reference is given, where it shows before the ramp."""
+"""Quantity of the reference before the ramp, by the quantity that sets it."""
 RUN_HEADINGS: Mapping[Purpose, str] = {
     "forward": "RUN FORWARD",
     "reverse": "RUN REVERSE",
@@ -60,24 +60,24 @@ RUN_HEADINGS: Mapping[Purpose, str] = {
 
 @dataclass(frozen=True, slots=True)
 class RunLine:
-    """Contents of the run line."""
+    """Contents of the run line at one moment."""
 
     purpose: Purpose
     text: str
-    """The reference as typed, without unit; empty where the drive takes none from here."""
+    """Reference as typed, without unit; empty if this panel cannot set it."""
     unit: str
-    """That of the drive's reference; empty where the drive takes none from here."""
+    """Unit of the drive's reference; empty if this panel cannot set it."""
     opened: float
-    """When it was drawn first, on the monotonic clock."""
+    """Monotonic time in seconds at which the line was opened."""
     stamp: int
-    """The drive's count of stops when the line was asked for: a later stop voids it."""
+    """The drive's count of stops when the line was opened; a later stop cancels the line."""
     fresh: bool = True
-    """True if it is the proposal yet, which the first digit replaces."""
+    """True if the next digit replaces the text, which is a proposal or the result of a step."""
     fault: str = ""
-    """Error in it, once Enter was pressed."""
+    """Error in the reference, found when Enter was pressed; empty if there is none."""
 
     def typed(self, character: str) -> RunLine | None:
-        """With one more character; None for one that a number has not."""
+        """Return the line with one more character; None if it cannot take that character."""
         if not self.unit:
             return None
         if character.isdecimal() and character.isascii():
@@ -90,11 +90,11 @@ class RunLine:
         return replace(self, text=text[:DIGITS_MOST], fresh=False, fault="")
 
     def erased(self) -> RunLine:
-        """With a character less; the whole proposal goes at once."""
+        """Return the line without its last character, or without the whole proposal."""
         return replace(self, text="" if self.fresh else self.text[:-1], fresh=False, fault="")
 
     def stepped(self, key: str, low: Decimal | None, high: Decimal | None) -> RunLine:
-        """A step up or down, at most to the limits."""
+        """Return the line one step higher or lower, within the limits and never below 0."""
         step = STEPS[key] * step_in(self.unit)
         try:
             number = Decimal(self.text or "0") + step
@@ -111,19 +111,19 @@ class RunLine:
         return f"{self.text}{self.unit}" if self.unit else None
 
     def counts(self, now: float) -> bool:
-        """Return True if Enter was meant for this line: it stood there long enough to be read."""
+        """Return True if Enter counts: the line was visible long enough to be read."""
         return now - self.opened >= ENTER_COUNTS_AFTER
 
     @property
     def is_zero(self) -> bool:
-        """True if its contents turn no motor."""
+        """True if the reference is 0, which turns no motor."""
         try:
             return bool(self.unit) and Decimal(self.text or "0") == 0
         except InvalidOperation:
             return False
 
     def checked(self, profile: Profile, readings: Mapping[str, Shown]) -> RunLine:
-        """With what is wrong with the reference, if anything is."""
+        """Return the line with the error in its reference, if there is one."""
         if not self.unit:
             return self
         if self.text and self.is_zero and self.purpose != "reference":
@@ -138,10 +138,10 @@ class RunLine:
 def proposed(
     profile: Profile, wanted: str, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> tuple[str, str]:
-    """Text and unit that a line begins with: the last reference given, else the drive's own.
+    """Return text and unit of a new line: the last reference given, else the drive's own.
 
-    Where that was not read yet it is what the drive goes by now: 0 would stop the motor. Both
-    empty where the drive takes none from here.
+    If that was not read, it is the reference before the ramp: 0 would stop the motor. Both are
+    empty if this panel cannot set a reference.
     """
     parameter = next(iter(reference_parameters(profile)), None)
     if parameter is None:
@@ -162,7 +162,10 @@ def proposed(
 def limits(
     profile: Profile, readings: Mapping[str, Shown]
 ) -> tuple[Decimal | None, Decimal | None, str]:
-    """Lowest and highest reference in its unit, as far as known, and the code of the highest."""
+    """Return the lowest and highest reference in its unit, and the code of the highest.
+
+    A limit that is not known is None.
+    """
     parameter = next(iter(reference_parameters(profile)), None)
     return (None, None, "") if parameter is None else reference_limits(profile, readings, parameter)
 
@@ -189,10 +192,10 @@ def run_lines(
     hindrance: str = "",
     output: Decimal | None = None,
 ) -> list[Text]:
-    """The line, what must be known before Enter above it, and its keys below.
+    """Return the run line, with notices above it and its keys below.
 
-    `hindrance` says why a run command would have no effect now, and what opens the way; `output`
-    is the frequency of the motor now, below 0 in reverse, None where it is not known.
+    `hindrance` is the reason why a run command would have no effect now, with the remedy. `output`
+    is the motor's frequency in Hz, negative in reverse; None if it is not known.
     """
     reported = [Text(f" {part}", style) for part, style in _parts_of(line, hindrance, width - 2)]
     lines = [*(reported or [Text("")]), _first(line, profile, readings, output), _second(line, now)]
@@ -205,7 +208,10 @@ def run_lines(
 
 
 def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Style]]:
-    """Return the error in the reference, why the command has no effect, or that it is 0."""
+    """Return the notice above the line in at most two rows, with its style.
+
+    It is the error in the reference, else a command without effect, else a reference of 0.
+    """
     if line.fault:
         message, style = line.fault, ALARM
     elif hindrance and line.purpose != "reference":
@@ -232,7 +238,7 @@ def _first(
 
 
 def _second(line: RunLine, now: float) -> Text:
-    """The keys of the line."""
+    """Return the keys of the line; Enter is dim until it counts."""
     second = Text(" ")
     second.append("Enter", KEY if line.counts(now) else FAINT)
     second.append(" set   " if line.purpose == "reference" else " run   ", FAINT)
@@ -248,7 +254,7 @@ def _second(line: RunLine, now: float) -> Text:
 def _around(
     line: RunLine, profile: Profile, readings: Mapping[str, Shown], output: Decimal | None
 ) -> str:
-    """The limits and the ramp, as far as they are known."""
+    """Return the known limits, ramp time and time to the reference."""
     parts = []
     low, high, code = limits(profile, readings)
     if high is not None:
@@ -265,8 +271,10 @@ def _around(
 def _there_in(
     line: RunLine, profile: Profile, readings: Mapping[str, Shown], output: Decimal
 ) -> list[str]:
-    """Return the ramp time from the present output: a motor turning the other way slows down
-    first."""
+    """Return the time in seconds from the present output to the reference; empty if unknown.
+
+    A motor that turns the other way slows down first.
+    """
     rated, up, down = (
         _number(profile, quantity, readings)
         for quantity in ("rated_frequency", "acceleration", "deceleration")

@@ -1,4 +1,4 @@
-"""Monitor: what the motor does, at one glance."""
+"""Monitor screen: the motor's state at a glance, and its commands."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
 
 
 def order_keys(view: View, keys: Sequence[KeyLabel]) -> Text:
-    """The line of keys: stop first; orders that cannot work now are dim."""
+    """Return the row of keys; commands that cannot work now are dim."""
 
     def styles(action: str) -> tuple[Style, Style]:
         if not action.startswith(("reset", "run_line")):
@@ -50,7 +50,7 @@ def order_keys(view: View, keys: Sequence[KeyLabel]) -> Text:
 
 
 def works_now(view: View, action: str) -> bool:
-    """Return True if an order can work now, as far as is known without asking the drive."""
+    """Return True if a command can work now, as far as known without another read."""
     if view.control.armed_for is None or view.lost or view.snapshot is None:
         return False
     in_fault = view.snapshot.state.kind == "fault"
@@ -60,20 +60,20 @@ def works_now(view: View, action: str) -> bool:
 
 
 REFRESH = 0.25
-"""Seconds between two looks at the latest snapshot; the line polls at its own pace."""
+"""Seconds between two checks of the latest snapshot; the line polls at its own rate."""
 FROZEN_AFTER = 5.0
 """Seconds under a dialog after which the values below it are reported as frozen."""
 STOP_SHOWN_FOR = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
-"""Seconds for which the end of a stop is shown."""
+"""Seconds for which the result of a stop is shown."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
 PLACED = frozenset({"top", "motor", "curve", "state", "said"})
-"""Parts whose rows depend on the room there is."""
+"""Parts that must exist before `_place` sizes the screen."""
 
 
 class MonitorScreen(CursorKeys):
-    """One drive, watched live; the screen only looks at what the line's worker brought."""
+    """Live values and commands of one drive, drawn from the snapshots of the line's worker."""
 
     CSS_PATH = "monitor.tcss"
     BINDINGS: ClassVar = bindings(MONITOR)
@@ -88,13 +88,13 @@ class MonitorScreen(CursorKeys):
         self._timer: Timer | None = None
         self._still: Timer | None = None
         self._reported: object = None
-        """Urgent parts of the latest snapshot as last shown."""
+        """Urgent parts of the snapshot that was shown last."""
         self._looked_at = -math.inf
         self._bottom_rows = 0
         self._placed: tuple[Arrangement, int, int] | None = None
 
     def body(self) -> ComposeResult:
-        """Fixed places, filled by lines."""
+        """Create the parts; `draw` fills them, and `_place` sizes them."""
         with Vertical(id="body"):
             with Horizontal(id="top"):
                 yield Lines(id="readouts")
@@ -104,13 +104,16 @@ class MonitorScreen(CursorKeys):
         yield Lines(id="message")
 
     def on_mount(self) -> None:
-        """Start watching."""
+        """Start polling the drive and refreshing the screen."""
         beside = codes_beside(self.session.profile)
         self.console.monitor.start(period=self.app.period, extra=beside)
         self._timer = self.set_interval(REFRESH, self._look_in_time)
 
     def _look_in_time(self) -> None:
-        """On a slow link figures seldom; a state, a fault and values that are new at once."""
+        """Refresh the screen; on a low-bandwidth link figures wait up to SELDOM seconds.
+
+        A new state, fault or error, and additional values, are shown immediately.
+        """
         snapshot, now = self.console.monitor.latest, self.app.clock.monotonic()
         reported = snapshot and (
             snapshot.state.kind,
@@ -127,19 +130,19 @@ class MonitorScreen(CursorKeys):
         self.look()
 
     def on_unmount(self) -> None:
-        """Stop watching; nobody looks any more, and nothing is commanded any more."""
+        """Disarm the drive and stop monitoring it: its state is no longer visible."""
         self.session.arming.disarm()
         self.console.monitor.stop()
 
     def on_resize(self, event: Resize) -> None:
-        """More room, more of everything."""
+        """Size the parts for the new terminal size."""
         if not self.is_too_small:
             self._place(self._room())
 
     def on_screen_suspend(self) -> None:
-        """Do not change while another screen is on top.
+        """Pause the refresh while another screen is on top.
 
-        What stirs below a screen makes Textual draw the whole terminal again.
+        A change below a screen makes Textual draw the whole terminal again.
         """
         if self._timer is not None:
             self._timer.pause()
@@ -147,7 +150,7 @@ class MonitorScreen(CursorKeys):
             self._still = self.set_timer(FROZEN_AFTER, lambda: self._tell_still(since))
 
     def _tell_still(self, since: str) -> None:
-        """Nobody shall take what shines through under a dialog for the present."""
+        """Mark the values that are visible under a dialog with the time at which they froze."""
         if self.app.screen.styles.background.a < 1:
             room = self._room()
             frozen = [Text(f"as of {since}", STALE), *[Text("")] * (READOUT_ROWS - 3)]
@@ -155,7 +158,7 @@ class MonitorScreen(CursorKeys):
             self.put("state", [*[Text("")] * room.lead, *box])
 
     def on_screen_resume(self, event: ScreenResume) -> None:
-        """Look again after another screen was on top."""
+        """Resume the refresh after another screen was on top."""
         if self._still is not None:
             self._still.stop()
         if self._timer is not None:
@@ -163,27 +166,27 @@ class MonitorScreen(CursorKeys):
         self.call_after_refresh(self.look)
 
     def draw_frame(self, view: FrameView) -> None:
-        """A message of several lines moves what is above it, and hides none of it."""
+        """Draw the frame; a message of several rows moves the parts above it and hides none."""
         super().draw_frame(view)
         if not self.is_too_small:
             self._place(self._room())
 
     def _room(self) -> Arrangement:
-        """Return the number of rows of each part."""
+        """Return the rows of each part for the present terminal size and bandwidth."""
         lean = self.app.low_bandwidth
         third = self.size.width >= WIDE and not lean
         count = len(other_values(self.session.profile, wide=third))
         return arrange(*self.size, count, lean=lean)
 
     def _place(self, room: Arrangement) -> None:
-        """Give each part its rows; the layout runs again only if they change."""
+        """Set the rows of each part; the layout runs again only if they change."""
         bottom = max(room.bottom, self._bottom_rows)
         placed = (room, bottom, self.message_rows)
         if placed == self._placed:
             return
         there = {part.id for part in self.query("Lines, Horizontal, Vertical")}
         if not there >= PLACED:
-            return  # not made yet, or on its way out
+            return  # not mounted yet, or being removed
         self._placed = placed
         rows = {"top": room.top, "motor": room.values, "curve": room.curve}
         for place, height in rows.items():
@@ -194,7 +197,7 @@ class MonitorScreen(CursorKeys):
         message.styles.margin = (0, 0, 1 + placed[2], 0)
 
     def draw(self, width: int) -> None:
-        """Show the latest snapshot; which keys work now depends on it."""
+        """Draw the latest snapshot, the run line if it is open, and the keys that work now."""
         view, room = self._view(), self._room()
         parts = monitor_parts(view, room, self._words)
         if (run := self.run_line_lines(view.now, width)) is not None:
@@ -207,7 +210,7 @@ class MonitorScreen(CursorKeys):
         self.ask_unrecorded()
 
     def keys_now(self, width: int) -> list[Text]:
-        """Those of the run line while that is open."""
+        """Return the keys of the run line while it is open, else those of the screen."""
         return self._keys_of(self._view(), width)
 
     def _keys_of(self, view: View, width: int) -> list[Text]:
@@ -222,7 +225,7 @@ class MonitorScreen(CursorKeys):
         return self._source.view(control, self._word, self.time_cursor)
 
     def action_change_rate(self, step: int) -> None:
-        """A faster or slower poll, out of a fixed row of rates."""
+        """Change the poll period by `step` places in PERIODS; a positive step polls faster."""
         now = PERIODS.index(min(PERIODS, key=lambda p: abs(p - self.app.period)))
         self.app.period = PERIODS[max(0, min(len(PERIODS) - 1, now - step))]
         self.console.monitor.period = self.app.period
@@ -230,13 +233,13 @@ class MonitorScreen(CursorKeys):
         self.look()
 
     def action_trend_window(self, step: int) -> None:
-        """A longer or shorter page of time."""
+        """Lengthen or shorten the page of time by `step`, and show the curve without a cursor."""
         self.time_cursor = self.time_cursor.with_span(step)
         self._word = None
         self.look()
 
     def action_next_word(self) -> None:
-        """The next table of values or bits; behind the last one the curve."""
+        """Show the next table of values or bits; after the last table, show the curve."""
         room = self._room()
         found = tables(self.session.profile, room, self._words)
         after = 0 if self._word is None else self._word + 1
@@ -246,7 +249,7 @@ class MonitorScreen(CursorKeys):
             self.put("curve", curve_or_table(self._view(), room, self._words))
 
     def action_rating(self) -> None:
-        """Enter the rated current of a drive that gives its current in %."""
+        """Prompt for the rated current, in A, of a drive that gives its current in %."""
         from ..dialogs.ask import Ask
 
         current = self.session.profile.quantity("motor_current")
@@ -267,7 +270,7 @@ class MonitorScreen(CursorKeys):
 
 
 class ViewSource:
-    """Makes Monitor's view of the moment; belongs to the panel's loop."""
+    """Source of Monitor's views; use it only in the panel's event loop."""
 
     def __init__(self, app: Panel, console: DriveConsole) -> None:
         self._app = app
@@ -275,7 +278,7 @@ class ViewSource:
         self._was = ""
 
     def view(self, control: Control, word: int | None, cursor: TimeCursor) -> View:
-        """All that the screen shows now; `word` is the table in the place of the curve."""
+        """Return the present contents; `word` is the index of a table, None for the curve."""
         app, console, session = self._app, self._console, self._console.session
         now, monitor, fleet = app.clock.monotonic(), console.monitor, app.fleet
         snapshot = monitor.latest
@@ -307,13 +310,13 @@ class ViewSource:
         )
 
     def _fault_at(self) -> str:
-        """The time of this drive's trip, or since when its fault was seen."""
+        """Return when this drive tripped or its fault was first seen; empty without a fault."""
         fleet, device = self._app.fleet, self._console.session.device
         active = fleet.alarms.active if fleet else ()
         return next((fault.when for fault in active if fault.device == device), "")
 
     def _stop(self, now: float) -> StopReport | None:
-        """Return the result of a stop of this drive; a good result for a while only."""
+        """Return the report of this drive's latest stop; None once it is overtaken or expired."""
         fleet, session = self._app.fleet, self._console.session
         report = fleet.stopper.reports.get(session.device) if fleet else None
         if report is None or self._is_overtaken(report):
@@ -321,7 +324,7 @@ class ViewSource:
         return report if now - report.since < STOP_SHOWN_FOR.get(report.phase, now) else None
 
     def _is_overtaken(self, report: StopReport) -> bool:
-        """Return True if something newer is true: a later command, or a motor that runs again."""
+        """Return True if a later command, or a motor that runs again, supersedes the report."""
         outcome, latest = self._console.session.work.outcome, self._console.latest
         if outcome is not None and outcome.time > report.since:
             return True
@@ -330,7 +333,7 @@ class ViewSource:
 
 
 def fault_of_rating(text: str) -> str:
-    """Return the error in a typed rated current, or nothing."""
+    """Return the error in a typed rated current; empty if it is valid."""
     try:
         number = Decimal(text.strip().replace(",", "."))
     except InvalidOperation:

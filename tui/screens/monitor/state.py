@@ -1,4 +1,4 @@
-"""State of the drive in words, and its commander: the block at the right; pure functions."""
+"""State block at the right, with the drive's state, commander and timeout; pure functions."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ from .view import View, directed
 
 STATE_LABEL_CELLS = 8
 MORE_ROWS = 3
-"""Rows for what must be said about a state; the answers of the line keep theirs."""
+"""Most rows of details on a state; the row of answers stays."""
 STANDSTILL = 0.05
-"""Hz below which a motor is at standstill."""
+"""Frequency in Hz below which a value counts as 0."""
 HEADS = {
     Phase.SENDING: ("STOP WAITS", ATTENTION),
     Phase.UNHEEDED: (" NOT STOPPED ", FAULT_BLOCK),
@@ -46,9 +46,10 @@ KEY_TO_DIAGNOSE = "press N"
 
 
 def state_lines(view: View, width: int) -> list[Text]:
-    """Five lines: what it does, who commands, who gives the reference, its timeout, the answers.
+    """Return five rows: state, command source, reference source, timeout and answers.
 
-    While polling keeps its timeout from running out, that line has the time since the last poll.
+    Details on a state replace the rows after it. An active timeout shows the time since the last
+    answer.
     """
     head, more = _head(view, width)
     rows = [
@@ -65,7 +66,7 @@ def state_lines(view: View, width: int) -> list[Text]:
 
 
 def _head(view: View, width: int) -> tuple[Text, list[Text]]:
-    """The state in words, and what must be said beside it."""
+    """Return the state in words, and its details in further rows."""
     snapshot = view.snapshot
     if view.stop is not None and view.stop.phase in NOT_STOPPING:
         return _stop(view.stop, width)
@@ -97,7 +98,7 @@ def _stop(report: StopReport, width: int) -> tuple[Text, list[Text]]:
 
 
 def _lost(view: View, words: str, width: int) -> tuple[Text, list[Text]]:
-    """Nothing here is the present: since when, what it was, and what the drive does about it."""
+    """Return an unknown state: for how long, the last known state, and the drive's reaction."""
     age = age_text(view.age or 0.0)
     was = view.was or (view.snapshot.state.headline if view.snapshot else "")
     known = f"STATE UNKNOWN for {age}"
@@ -133,7 +134,7 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
 
 
 def _running(view: View, state: DriveState) -> str:
-    """Return whether the motor is at its reference, or which way it is going."""
+    """Return how a running motor follows its reference: reached, on the ramp, or reversing."""
     output, wanted = (_hertz(view, q) for q in ("output_frequency", "frequency_reference"))
     if state.reached and wanted is not None and abs(wanted) < STANDSTILL:
         return "enabled, at 0 Hz"
@@ -155,7 +156,7 @@ def _hertz(view: View, quantity: Quantity) -> float | None:
 
 
 def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]:
-    """Its code, its name, its time, and the key that shows what to do."""
+    """Return the fault's code, name and time, and the key that shows its remedy."""
     fault = state.fault
     code = fault.code if fault else "code not read"
     lines = [Text(short(fault.name if fault else "", width), STRONG), Text(view.fault_at, FAINT)]
@@ -166,13 +167,13 @@ def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]
 
 
 def _pair(label: str, text: str, style: Style, width: int) -> Text:
-    """A label at the left and its text at the right."""
+    """Return a row with a label at the left and its text at the right."""
     text = short(text, max(1, width - len(label) - 1))
     return Text(f"{label:<{width - len(text)}}", FAINT, no_wrap=True).append(text, style)
 
 
 def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
-    """Return the source of the command or the reference."""
+    """Return the row with the source of the command or the reference."""
     state = view.snapshot.state if view.snapshot and not view.lost else None
     reported = (
         ""
@@ -200,7 +201,7 @@ def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
 
 
 def _timeout(view: View, width: int) -> tuple[str, Style]:
-    """After how long without a request the drive acts, and how long ago it last answered."""
+    """Return the drive's timeout with the age of its last answer, or with its state."""
     watch = view.watch
     if watch is None:
         return "none known", FAINT
@@ -214,7 +215,7 @@ def _timeout(view: View, width: int) -> tuple[str, Style]:
 
 
 def _polled(view: View, text: str, timeout: float) -> tuple[str, Style]:
-    """A timeout with the age of the last answer, in whole seconds: it changes seldom."""
+    """Return a timeout with the age of the last answer in whole seconds, so it changes rarely."""
     if view.heard is None:
         return text, PLAIN
     age = max(0.0, view.now - view.heard)
@@ -224,7 +225,7 @@ def _polled(view: View, text: str, timeout: float) -> tuple[str, Style]:
 
 
 def _answers(view: View) -> tuple[str, Style]:
-    """Good answers out of the requests of the last minute, of the whole line."""
+    """Return the line's good replies of the last 60 s, out of good, lost and damaged ones."""
     minute = view.counters.minute
     if minute.share is None:
         return NOT_AVAILABLE, FAINT
@@ -233,7 +234,7 @@ def _answers(view: View) -> tuple[str, Style]:
 
 
 def countdown(view: View) -> str:
-    """Return a drive's reaction when polling stops, and the time; empty if none."""
+    """Return the drive's reaction when polling stops, and the seconds left; empty if none."""
     left = view.time_left
     if left is None or view.watch is None:
         return ""

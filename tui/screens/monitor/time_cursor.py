@@ -1,4 +1,4 @@
-"""The page of time that the curve shows, the cursor that reads it, and their keys."""
+"""Page of time that the curve shows, the cursor that reads it, and their keys."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ FIRST_OPEN = "{} moves the cursor. Press = first."
 
 @dataclass(frozen=True, slots=True)
 class TimeCursor:
-    """A page of time, and the cursor on it; times are monotonic, in seconds.
+    """Page of time, and the cursor on it; times are monotonic, in seconds.
 
-    While there is a cursor the page does not turn: what is read stays where it is.
+    While the cursor is open the page does not turn, so the curve under it does not move.
     """
 
     step: PageStep = USUAL_STEP
@@ -29,7 +29,7 @@ class TimeCursor:
     """Moment that the cursor reads; None if there is no cursor."""
 
     def with_span(self, step: int) -> TimeCursor:
-        """Return a page that is longer or shorter by a step, with no cursor."""
+        """Return a page longer or shorter by `step` places in PAGE_STEPS, with no cursor."""
         at = PAGE_STEPS.index(self.step) + step
         return TimeCursor(PAGE_STEPS[max(0, min(len(PAGE_STEPS) - 1, at))])
 
@@ -42,14 +42,14 @@ class TimeCursor:
         return replace(self, page=page_start(moment + apart, self.step) - apart, moment=moment)
 
     def moved(self, columns: int, width: int, first: float, last: float) -> TimeCursor:
-        """Return the cursor so many columns of `width` further, from `first` to `last` at most.
+        """Return the cursor moved by columns of a page of `width`, within `first` and `last`.
 
-        At an edge the page turns.
+        The page turns if the cursor crosses its edge.
         """
         if self.moment is None or self.page is None:
             return self
         cell = self.step.span / width
-        # the middle of a column: the error of a sum of columns never reaches its edge
+        # the middle of a column, so that rounding errors never cross its edge
         column = (self.moment - self.page) // cell + columns
         moment = self.page + (column + 0.5) * cell
         moment = max(first, min(last, moment))
@@ -62,18 +62,18 @@ class TimeCursor:
 
 
 class CursorKeys(InputKeys):
-    """Keys that read the curve at a moment; no other key changes its meaning."""
+    """Keys of the cursor on the curve; an open cursor changes no other key."""
 
     time_cursor = TimeCursor()
     _word: int | None = None
-    """The table in the place of the curve, which is None."""
+    """Index of the table shown instead of the curve; None for the curve."""
 
     def _room(self) -> Arrangement:
         raise NotImplementedError
 
     @property
     def reads_curve(self) -> bool:
-        """True if there is a cursor."""
+        """True while the cursor is open."""
         return self.time_cursor.moment is not None
 
     def action_cursor(self) -> None:
@@ -90,7 +90,7 @@ class CursorKeys(InputKeys):
         self.look()
 
     def action_move_cursor(self, columns: int) -> None:
-        """Move the cursor; without one, name the key that opens it."""
+        """Move the cursor by columns; if it is closed, name the key that opens it."""
         trend = self.console.monitor.trend
         if not self.reads_curve or not trend:
             self.app.tell(FIRST_OPEN.format("Left" if columns < 0 else "Right"))
@@ -100,7 +100,7 @@ class CursorKeys(InputKeys):
         self.look()
 
     def action_leave(self) -> None:
-        """Close the cursor; without one, go back to Line."""
+        """Close the cursor; if it is closed, go back to Line."""
         if self.reads_curve:
             self.action_cursor()
             return

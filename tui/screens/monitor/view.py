@@ -28,12 +28,12 @@ from tui.widgets.curve import (
 from tui.widgets.palette import age_text
 
 USUAL_STEP = PAGE_STEPS[2]
-"""Page of the curve at first: 60 s."""
+"""Initial page of the curve: 60 s."""
 
 
 @dataclass(frozen=True, slots=True)
 class View:
-    """All that the Monitor screen shows at one moment; times are monotonic, in seconds."""
+    """Contents of the Monitor screen at one moment; times are monotonic, in seconds."""
 
     profile: Profile
     snapshot: Snapshot | None
@@ -44,13 +44,13 @@ class View:
     now: float
     read_only: bool = False
     plain: bool = False
-    """True if it is drawn in signs of ASCII."""
+    """True if only ASCII signs are drawn."""
     braille: bool = True
-    """True if the terminal has the dots of braille."""
+    """True if the terminal can show braille."""
     watch: TimeoutWatch | None = None
-    """The drive's watch over the line, where it has one that runs."""
+    """The drive's communication timeout; None if none is known."""
     heard: float | None = None
-    """When the drive last answered anybody on this line."""
+    """When the drive last answered a request of any program on this line."""
     control: Control = UNARMED
     stop: StopReport | None = None
     """Result of a recent stop."""
@@ -67,12 +67,12 @@ class View:
     stands_by: bool = False
     """True if the motor is at standstill and the next command of this panel runs it."""
     fault_at: str = ""
-    """Time of day at which the fault was seen first; empty where that is not known."""
+    """Time of the trip, or of the fault's first read, as text; empty if unknown."""
     word: int | None = None
-    """Which table of values or bits is shown in place of the curve; None for the curve."""
+    """Index of the table shown instead of the curve; None for the curve."""
 
     def reading(self, code: str) -> Shown | None:
-        """A reading as good as it is now, not as it was when it came."""
+        """Return a reading with its quality at this moment; None if there is none."""
         if self.snapshot is None or (reading := self.snapshot.readings.get(code)) is None:
             return None
         often = self.lost or not (self.slow(code) or self.rare(code))
@@ -80,40 +80,40 @@ class View:
 
     @property
     def cycle(self) -> float:
-        """Seconds from one cycle to the next, as wished or as the line allows."""
+        """Seconds from one cycle to the next: the poll period, or more if the line is slower."""
         rate = self.snapshot.rate if self.snapshot is not None else 0.0
         return max(self.period, 1 / rate if rate else self.period)
 
     @property
     def signs(self) -> CurveSigns:
-        """Characters of the terminal for curves."""
+        """Characters for curves that the terminal can show."""
         return ASCII_SIGNS if self.plain else BRAILLE if self.braille else BLOCKS
 
     @property
     def page_start(self) -> float:
-        """Start of the page of the curve."""
+        """Monotonic time at which the page of the curve starts."""
         if self.page is not None:
             return self.page
         return page_start(self.now + self.apart, self.step) - self.apart
 
     def slow(self, code: str) -> bool:
-        """Return True if the value is one that need not come with every cycle."""
+        """Return True if the monitoring set does not read the value in every cycle."""
         return any(v.parameter == code and v.rate != "fast" for v in self.values)
 
     def rare(self, code: str) -> bool:
-        """Return True if the value is one of those read seldom beside the monitoring set."""
+        """Return True if the value is not in the monitoring set, and so is read rarely."""
         return code not in {value.parameter for value in self.values}
 
     @property
     def time_left(self) -> float | None:
-        """Seconds until the drive reacts to its timeout if polling stops; None if it does not."""
+        """Seconds until the drive's timeout if polling stops; None without an active timeout."""
         if self.watch is None or not self.watch.active or self.heard is None:
             return None
         return self.watch.timeout - (self.now - self.heard)
 
     @property
     def values(self) -> list[MonitoringValue]:
-        """The monitoring set."""
+        """Values of the profile's monitoring set."""
         return self.profile.data.monitoring.values
 
     @property
@@ -125,7 +125,7 @@ class View:
 
     @property
     def age(self) -> float | None:
-        """Seconds since what is shown was the present; None while it is, or where nothing came."""
+        """Seconds since the newest value was read; None while values are current or missing."""
         if self.snapshot is None or not self.lost:
             return None
         times = [reading.time for reading in self.snapshot.readings.values()]
@@ -133,7 +133,7 @@ class View:
 
     @property
     def trouble(self) -> str:
-        """Why what is shown is not the present; empty while it is."""
+        """Reason why the values are not current; empty while they are."""
         if self.snapshot is None or self.snapshot.error:
             return self.snapshot.error if self.snapshot is not None else ""
         if self.snapshot.is_stale(self.now):
@@ -142,14 +142,14 @@ class View:
 
 
 def directed(view: View, parameter: Parameter | None, number: float | None) -> float | None:
-    """A value with the sign of its direction, which the drive may report beside it."""
+    """Return a value with the sign of its direction, which the drive may report separately."""
     if number is None or parameter is None or view.snapshot is None:
         return None
     return with_direction(parameter, number, view.snapshot.state)
 
 
 def end_of(view: View, end: str) -> float | None:
-    """The end of a bar: a number, or the value of a parameter of the drive."""
+    """Return the end of a bar, a number or the value of a parameter; None if unknown."""
     if not end:
         return None
     try:
@@ -164,12 +164,12 @@ def end_of(view: View, end: str) -> float | None:
 
 
 def bar_number(value: Value) -> float | None:
-    """The engineering value for a bar; None for names and words."""
+    """Return the engineering value for a bar; None for names and words."""
     return None if value.number is None else float(value.number)
 
 
 def decimal_places(parameter: Parameter) -> int:
-    """Return the decimals of a value, the most of all scales that it may have."""
+    """Return the most decimals that any scale of the parameter has."""
     follows = parameter.scale_by
     scales = [parameter.scale, *(follows.scales.values() if follows is not None else ())]
     return max(decimals_of(Decimal(scale)) for scale in scales)

@@ -1,4 +1,4 @@
-"""Words with named bits: in a line what is true, and whole; pure functions of a view."""
+"""Words with named bits, as rows of true texts or as tables; pure functions of a view."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SHORT_NAMES: Mapping[str, str] = {
     "remote": "",
     "direction of the output": "reverse",
     "limit of the reference": "outside its limits",
-    # at 0
+    # bits that are 0
     "power section supplied: no supply": "no power",
     "remote: local": "local",
     "drive ready: not ready": "not ready",
@@ -50,7 +50,7 @@ SHORT_NAMES: Mapping[str, str] = {
     "standby with run command: starting up": "",
     "control: remote": "",
 }
-"""Short forms of what bits say; nothing for what is so while all is well."""
+"""Short forms of bit texts, by the text in lower case; empty for the normal state."""
 CODE_CELLS, RAW_CELLS = 6, 9
 BIT_CELLS = 26
 """Least cells of a bit if bits are in columns."""
@@ -61,7 +61,7 @@ PLAIN_ANSWERS = frozenset(
 )
 """Texts of bits that mean only yes or no: alone they would not name their subject."""
 DENIALS = frozenset({"no", "off", "none", "normal", "0"})
-"""Words of a bit that deny its name."""
+"""Texts of bits that negate the name of the bit."""
 GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
 """Texts of bits that add nothing to the name of a bit that is 1."""
 ALL_BITS = (("Tab", KEY), (" all bits ", FAINT))
@@ -71,7 +71,7 @@ ALL_BITS_CELLS = 13
 
 @dataclass(frozen=True, slots=True)
 class WordPage:
-    """Bits of a word that are shown together."""
+    """Bits of a word that are shown together, as page `number` of `of`."""
 
     parameter: Parameter
     bits: tuple[Bit, ...]
@@ -80,12 +80,12 @@ class WordPage:
 
 
 def shown_words(view_words: Sequence[Parameter]) -> list[Parameter]:
-    """The words that have a line of their own: those that hold more than alarms, two at most."""
+    """Return at most two words for the bottom rows: those with more than alarm bits."""
     return [word for word in view_words if not all(bit.alarm for bit in word.bits)][:2]
 
 
 def word_line(view: View, parameter: Parameter, width: int) -> Text:
-    """A word and what its bits say that is true, as much as there is room for."""
+    """Return a word with its true bit texts, and the count of those that do not fit."""
     raw, shown = _raw(view, parameter)
     mark = "" if is_verified(parameter) else " ?"
     text = Text(f"  {cut(parameter.code + mark, CODE_CELLS)}", FAINT, no_wrap=True)
@@ -102,7 +102,7 @@ def word_line(view: View, parameter: Parameter, width: int) -> Text:
 
 
 def _true_words(parameter: Parameter, raw: int) -> Iterator[tuple[str, bool]]:
-    """Yield the texts of active bits in short form, and whether each is an alarm."""
+    """Yield each true bit text in short form, and True if it is an alarm."""
     for bit in parameter.bits:
         on = bool(raw >> bit.bit & 1)
         if _counts(bit, raw) and _holds(bit, on) and (words := short_bit(bit, on=on)):
@@ -110,7 +110,7 @@ def _true_words(parameter: Parameter, raw: int) -> Iterator[tuple[str, bool]]:
 
 
 def alarm_line(view: View, width: int, *, tab: bool) -> Text:
-    """The present alarms; at the right the key that shows all bits."""
+    """Return the present alarms and, if `tab`, the key that shows all bits."""
     text = Text(f"  {'Alarms':<{CODE_CELLS + RAW_CELLS}} ", FAINT, no_wrap=True)
     message, style = _alarms(view)
     room = width - text.cell_len - (ALL_BITS_CELLS if tab else 1)
@@ -134,7 +134,7 @@ def _alarms(view: View) -> tuple[str, Style]:
 
 
 def has_alarm(view: View) -> bool:
-    """True if the drive reports an alarm now."""
+    """Return True if the drive's current values contain an alarm."""
     if view.snapshot is None or view.lost:
         return False
     return bool(view.snapshot.state.alarms or view.snapshot.state.alarm)
@@ -151,7 +151,7 @@ def short_bit(bit: Bit, *, on: bool) -> str:
 
 
 def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
-    """The words in pages of at most so many bits."""
+    """Return the words in pages of at most `room` bits."""
     pages: list[WordPage] = []
     room = max(1, room)
     for parameter in words:
@@ -162,12 +162,12 @@ def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
 
 
 def bit_columns(width: int) -> int:
-    """Return the number of columns of bits."""
+    """Return the number of columns of bits that fit in `width` cells."""
     return max(1, (width - 1) // BIT_CELLS)
 
 
 def bit_grid(view: View, page: WordPage, width: int, height: int) -> list[Text]:
-    """A word with its bits in columns: a heading, then as many rows as there are.
+    """Return a word with its bits in columns below a heading, in exactly `height` rows.
 
     There are no more columns than the bits need, so that each name has as much room as possible.
     """
@@ -185,13 +185,13 @@ def bit_grid(view: View, page: WordPage, width: int, height: int) -> list[Text]:
 
 
 def bit_lines(view: View, page: WordPage, width: int) -> list[Text]:
-    """Named bits of a word below each other, with the word itself."""
+    """Return the heading of a word, and a row for each bit of the page."""
     raw, _ = _raw(view, page.parameter)
     return [_heading(view, page, width), *(_bit_line(bit, raw, width) for bit in page.bits)]
 
 
 def _raw(view: View, parameter: Parameter) -> tuple[int | None, str]:
-    """A word as it is now, and as a person reads it; dashes where it is not known."""
+    """Return the current raw value of a word and its text; None and dashes if unknown."""
     reading = view.reading(parameter.code)
     none: tuple[int | None, str] = (None, NOT_AVAILABLE)
     if reading is None:
@@ -215,7 +215,7 @@ def _heading(view: View, page: WordPage, width: int) -> Text:
 
 
 def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
-    """A bit in exactly so many cells; callers copy it before changing it."""
+    """Return a bit in exactly `width` cells. The text is cached: copy it before changing it."""
     if raw is not None and not _counts(bit, raw):
         return _dim_bit(bit, width)
     return _drawn_bit(bit, None if raw is None else bool(raw >> bit.bit & 1), width)
@@ -223,7 +223,7 @@ def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
 
 @lru_cache(maxsize=128)
 def _dim_bit(bit: Bit, width: int) -> Text:
-    """A bit that means nothing in this state: its name, and no words of its value."""
+    """Return a bit that is not valid in this state: its name without its value."""
     text = Text(f" {bit.bit:>2} ", LINE, no_wrap=True).append("·", FAINT)
     return text.append(f" {cut(bit.name, width - 7)} ", FAINT)
 
@@ -242,25 +242,28 @@ def _drawn_bit(bit: Bit, on: bool | None, width: int) -> Text:
 
 
 def _counts(bit: Bit, raw: int) -> bool:
-    """True if the bit means anything in the state that its word shows."""
+    """Return True if the bit is valid in the state that its word shows."""
     return bit.counts is None or raw & bit.counts.mask == bit.counts.value
 
 
 def _holds(bit: Bit, on: bool) -> bool:
-    """True if the words that are drawn hold now; a bit at 0 may state a thing too."""
+    """Return True if the drawn text is true now; a bit that is 0 may state a fact too."""
     if (bit.on if on else bit.off).casefold() not in PLAIN_ANSWERS:
         return True
     return on or _denied_at_1(bit)
 
 
 def _denied_at_1(bit: Bit) -> bool:
-    """True if the name alone would be wrong at 1 and right at 0."""
+    """Return True if the name alone would be wrong at 1 and right at 0."""
     on, off = bit.on.casefold(), bit.off.casefold()
     return on in DENIALS or (off in PLAIN_ANSWERS - DENIALS and off != "")
 
 
 def _bit_words(bit: Bit, on: bool, room: int) -> str:
-    """The name of a bit; what it says as well, where that is more than yes or no and fits."""
+    """Return the name of a bit, its text, or both if they fit in `room` cells.
+
+    A text that means only yes or no is omitted.
+    """
     message = bit.on if on else bit.off
     plain = message.casefold() in PLAIN_ANSWERS
     if not _denied_at_1(bit) and (plain or (on and message.casefold() in bit.name.casefold())):
