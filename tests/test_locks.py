@@ -34,7 +34,7 @@ WITHOUT_LOCK = {
     "Fleet._look_for_left": ("_departed", "replaced as a whole"),
     "BackgroundListener._listen": ("trouble", "replaced as a whole"),
     "BackgroundListener.open": (
-        "_families _hearing _stack _thread link",
+        "_families _port_listener _stack _thread link",
         "before its thread begins",
     ),
     "LineWatch._glance": ("_looks", "replaced as a whole"),
@@ -49,7 +49,7 @@ WITHOUT_LOCK = {
     "UnknownDrivePoller.keep": ("_workers", "one entry, set in one step"),
     "UnknownDrivePoller.stop": ("_workers", "copied in one step"),
     "WorkQueue.busy_for": ("_waiting", "copied in one step"),
-    "WorkQueue.tell": ("outcome", "replaced as a whole"),
+    "WorkQueue.report": ("outcome", "replaced as a whole"),
 }
 """By method: what it changes or reads without the lock of its class, and why that is safe."""
 

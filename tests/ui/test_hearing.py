@@ -299,3 +299,13 @@ def test_pictures(snap_compare: Callable[..., bool], page: str, size: tuple[int,
         await pilot.pause()
 
     assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+@pytest.mark.parametrize(("lines", "top"), [(-1, 4), (1, 6), (-10, 0), (10, 15)])
+def test_up_scrolls_the_summary_up(lines: int, top: int) -> None:
+    """The arguments are those of the keys Up, Down, PgUp and PgDn."""
+    screen = ListeningScreen.__new__(ListeningScreen)
+    screen._page, screen._top = "sum", 5
+    screen.look = lambda: None  # type: ignore[method-assign]
+    screen.action_scroll(lines)
+    assert screen._top == top

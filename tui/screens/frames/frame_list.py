@@ -1,4 +1,4 @@
-"""A list of frames in codes and values or as bytes: held, scrolled, filtered, searched, saved."""
+"""List of frames, decoded or as bytes, with pause, scrolling, filter, search and saving."""
 
 from __future__ import annotations
 
@@ -27,82 +27,85 @@ from .saving import KeptFrames, ask_where
 Page = Literal["words", "bytes", "sum"]
 PAGES: tuple[Page, ...] = ("words", "bytes", "sum")
 FEW = 6
-"""Frames that are shown on a slow link while they come."""
-TITLES = {
+"""Maximum frames shown on a slow link while the list is not paused."""
+HEADINGS = {
     (False, False): "{heading}",
     (False, True): "{heading} (paused)",
     (True, False): "{heading}, filter: {filter}",
     (True, True): "{heading}, filter: {filter} (paused)",
 }
-"""The heading of the list, by whether it is filtered and whether it is paused."""
+"""Heading of the list; the keys are (filtered, paused)."""
 FILTER_HINT = "drive, function, error or text, for example 2-read-error"
 FIND_HINT = "drive, function, error or text; Enter finds the next older frame"
 
 
 class KeptLine(Protocol):
-    """A line with its last frames, and the profiles that explain them."""
+    """Line with its recorded frames, and the profiles that decode them."""
 
     @property
     def link(self) -> Link:
-        """The line that the frames went over."""
+        """Line on which the frames were recorded."""
 
     @property
     def frames(self) -> tuple[Frame, ...]:
-        """The frames that are kept now, oldest first."""
+        """The recorded frames, oldest first; older ones are dropped."""
 
     def profile(self, device: int) -> Profile | None:
-        """The profile that explains the frames of a drive."""
+        """Return the profile that decodes the frames of a drive; None if it is unknown."""
 
     def raws(self, device: int) -> Mapping[str, int]:
-        """Raw values of a drive that scale others."""
+        """Return the known raw values of a drive by code; some scale other values."""
 
 
 class FrameListScreen(PanelScreen):
-    """The frames of a line, the newest at the bottom; its last page sums them up."""
+    """Frames of a line, the newest at the bottom; the last page summarizes them."""
 
     LOOK = 0.5
     AUTO_FOCUS: ClassVar = ""
-    """None: while the field has the focus, Space is text and stops nothing."""
+    """Empty: in a focused field, Space would be text instead of a stop."""
 
     def __init__(self) -> None:
         super().__init__()
         self._source: KeptLine
-        """Whose frames are listed; each screen sets its own."""
+        """Line whose frames are listed; each subclass sets it."""
         self._heading = "Frames on the line"
         self._held: tuple[Frame, ...] | None = None
         self._up = 0
-        """Number of frames below the last one shown."""
+        """Number of chosen frames below the last visible one."""
         self._page: Page = "words"
         self._filter = ""
         self._asking: Literal["", "filter", "find"] = ""
         self._found: Frame | None = None
         self._room = 1
         self._since_epoch = 0.0
-        """Offset of a frame's time to 1970; taken once, so that shown times do not change."""
+        """Seconds to add to a frame's time to get seconds since 1970.
+
+        Computed once, so that shown times do not change when the clock is set.
+        """
 
     def body(self) -> ComposeResult:
-        """One list, and under it the field for what is wanted of it."""
+        """Yield the list, and below it the field for a filter or search."""
         yield Lines(id="frames")
         with Horizontal(id="wanted"):
             yield Plain("", id="which")
             yield WordField(id="typed")
 
     def on_mount(self) -> None:
-        """Nothing is asked for yet."""
+        """Compute the clock offset, and hide the field."""
         self._since_epoch = self.app.clock.wall() - self.app.clock.monotonic()
         self.query_one("#wanted").display = False
 
-    # What a screen of this kind adds
+    # For subclasses
 
     def sum_lines(self, width: int, height: int) -> list[Text]:
-        """The last page as it is now."""
+        """Return the current last page in at most `height` rows."""
         raise NotImplementedError
 
     def _begin_sum(self) -> None:
-        """The last page is shown from now on."""
+        """Prepare the last page, which is now shown; does nothing by default."""
 
     def _scroll_sum(self, lines: int) -> None:
-        """Up or down the last page, where it can be longer than the screen."""
+        """Scroll the last page by a number of rows; does nothing by default."""
 
     @property
     def _shows_sum(self) -> bool:
@@ -119,7 +122,7 @@ class FrameListScreen(PanelScreen):
         frames = self._kept
         room, columns, few = self._room, width, ""
         if self.app.low_bandwidth and self._held is None:
-            # all of them anew each time is more than a slow link carries
+            # a slow link cannot carry a full list on each refresh
             room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h for all, "
         places = self._places(frames)
         self._up = min(self._up, max(0, len(places) - room))
@@ -130,7 +133,7 @@ class FrameListScreen(PanelScreen):
         self.put("frames", lines + self._lines(frames, shown, columns))
 
     def _title(self) -> str:
-        title = TITLES[bool(self._filter), self._held is not None]
+        title = HEADINGS[bool(self._filter), self._held is not None]
         return title.format(heading=self._heading, filter=self._filter)
 
     @property
@@ -138,7 +141,7 @@ class FrameListScreen(PanelScreen):
         return self._held if self._held is not None else self._source.frames
 
     def _places(self, frames: Sequence[Frame]) -> list[int]:
-        """Places of the frames that are wanted."""
+        """Return the places of the frames that match the filter."""
         return chosen(frames, choice_of(self._filter), self._texts_of, tcp=self._is_tcp)
 
     def _lines(self, frames: Sequence[Frame], places: Sequence[int], width: int) -> list[Text]:
@@ -159,7 +162,7 @@ class FrameListScreen(PanelScreen):
         ]
 
     def _words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
-        """Return the text of some frames; a reply is explained by its request, seen or not."""
+        """Decode the frames at these places; a request that is not shown still helps its reply."""
         if not places:
             return []
         first = places[0] - 1 if places[0] else 0
@@ -173,18 +176,18 @@ class FrameListScreen(PanelScreen):
     def _is_tcp(self) -> bool:
         return isinstance(self._source.link, TcpLink)
 
-    # Holding, scrolling, pages
+    # Pausing, scrolling, pages
 
     def action_hold(self) -> None:
-        """Hold the list still, or let it run."""
+        """Pause or resume the list; show the newest frames."""
         self._held = self._source.frames if self._held is None else None
         self._up, self._found = 0, None
         self.look()
 
     def action_scroll(self, frames: int) -> None:
-        """Older frames or newer ones; the list is held."""
+        """Scroll by a number of frames, negative for older ones; this pauses the list."""
         if self._shows_sum:
-            self._scroll_sum(-frames)
+            self._scroll_sum(frames)
             return
         if self._held is None:
             self._held = self._source.frames
@@ -192,7 +195,7 @@ class FrameListScreen(PanelScreen):
         self.look()
 
     def action_other_page(self) -> None:
-        """Words, bytes, the last page in turn."""
+        """Show the next page: text, bytes, the last page."""
         self._page = PAGES[(PAGES.index(self._page) + 1) % len(PAGES)]
         if self._shows_sum:
             self._end_asking()
@@ -202,11 +205,11 @@ class FrameListScreen(PanelScreen):
     # Filtering and finding
 
     def action_only(self) -> None:
-        """Show only some frames: of a drive, a function, with errors, that say something."""
+        """Ask for a filter by drive, function, errors or text."""
         self._ask_for("filter", " only ", self._filter, FILTER_HINT)
 
     def action_find_frame(self) -> None:
-        """Find a frame: the list is held, and the newest that fits is shown and marked."""
+        """Ask for frames to find; Enter pauses the list and marks the newest match."""
         self._found = None
         self._ask_for("find", " find ", "", FIND_HINT)
 
@@ -224,7 +227,7 @@ class FrameListScreen(PanelScreen):
         self.call_after_refresh(self.look)
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
-        """Those of the filter, or of what is looked for."""
+        """Return the effects of keys in the field of the filter, or of the search."""
         if self._asking == "find":
             return ("Enter", "next older"), JOINS_KEY, ("Esc", "end")
         return ("Enter", "keep filter"), JOINS_KEY, ("Esc", "clear")
@@ -237,7 +240,7 @@ class FrameListScreen(PanelScreen):
 
     @property
     def _wanted(self) -> str:
-        """The typed words."""
+        """Typed text, with spaces for the hyphens that join words."""
         return self.query_one(WordField).words
 
     def on_input_changed(self) -> None:
@@ -248,7 +251,7 @@ class FrameListScreen(PanelScreen):
             self.look()
 
     def on_input_submitted(self) -> None:
-        """Keep the filter; or the next older frame that fits."""
+        """Keep the filter, or find the next older frame that matches."""
         if self._asking == "filter":
             self._end_asking()
         elif wanted := self._wanted.strip():
@@ -269,12 +272,12 @@ class FrameListScreen(PanelScreen):
             self.look()
             return
         self._found = shown[older[-1]]
-        # in the middle of the list, so that what came before and after it is seen
+        # center the match, so that frames before and after it are visible
         self._up = max(0, len(shown) - older[-1] - 1 - self._room // 2)
         self.look()
 
     def action_leave(self) -> None:
-        """Out of the field, then out of a filter, then out of the screen."""
+        """Close the field and clear the filter; without either, leave the screen."""
         if self._asking or self._filter:
             if self._asking != "find":
                 self._filter = ""
@@ -283,13 +286,13 @@ class FrameListScreen(PanelScreen):
         self._go_out()
 
     def _go_out(self) -> None:
-        """Back to the screen below."""
+        """Return to the screen below."""
         super().action_leave()
 
     # Saving
 
     def action_save_file(self) -> None:
-        """Save the frames that the list has, filtered as it is: for tshark, or as a text."""
+        """Ask for a file, and save the frames that match the filter: for tshark, or as text."""
         frames = self._kept
         places = self._places(frames)
         line = label(self._source.link)

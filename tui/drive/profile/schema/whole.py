@@ -28,7 +28,7 @@ from .wiring import Wiring
 class StartUpStep(Table, frozen=True, kw_only=True):
     """One step of a first commissioning; the steps are in their order.
 
-    Their parameters, in this order, are the group Simply start of the editor.
+    Their parameters, in this order, are the group Commissioning of the editor.
     """
 
     step: str
