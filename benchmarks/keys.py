@@ -76,7 +76,7 @@ TASKS = (
     ),
     Task(
         "change a ramp and keep it",
-        [("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", "Enter stage"), *typed("5"),
+        [("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", "Enter Stage"), *typed("5"),
          ("Enter!", "staged"), ARM, ("w", "Write 1"), ("y!", "verified"), ("S", "EEPROM?"),
          ("y!", "saved to EEPROM")],
         [("3", "settings"), ("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", ""),
@@ -90,7 +90,7 @@ TASKS = (
     ),
     Task(
         "compare with the last backup (before: the factory settings)",
-        [("C-o", "Compare with"), ("Enter!", "differ")],
+        [("C-o", "Compare with"), ("Enter!", "Differs")],
         [("o", "Compare with"), *typed("factory"), ("Enter", "factory settings")],
     ),
     Task(

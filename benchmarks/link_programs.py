@@ -98,7 +98,7 @@ def htop_turned(before: str, now: str) -> bool:
 _MONITOR_SHOWN = both(saying_all(*MONITOR), saying_none("Frames on the line", "Messages ─"))
 _MONITOR_GONE = saying_none("Motor voltage", "Heard ", "Alarms  ")
 _FRAMES_SHOWN = both(saying_all("Frames on the line", r"h hold .* q leave"), _MONITOR_GONE)
-_MESSAGES_SHOWN = both(saying_all("Messages ─", r"Esc back .* q leave"), _MONITOR_GONE)
+_MESSAGES_SHOWN = both(saying_all("Messages ─", r"Esc back .* q quit"), _MONITOR_GONE)
 PANEL_KEYS = (
     Press("Tab", "\t", word_sign),
     Press("7 Frames", "7", tabs, becoming(_FRAMES_SHOWN)),
