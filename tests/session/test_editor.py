@@ -291,10 +291,16 @@ async def test_setting_restored_to_its_saved_value_counts_as_saved() -> None:
 
 async def test_old_values_are_staged_again_after_they_were_unstaged() -> None:
     async with editing("atv71") as (made, editor):
-        await write(made, editor, "ACC", "7.5 s")
-        await write(made, editor, "DEC", "8 s")
+        await write(made, editor, "INR", "0.01 s")
+        await write(made, editor, "INR", "0.1 s")
+        await read(made, editor, "ACC", "DEC")
         staging = editor.staging
-        for _ in range(2):
+        staging.stage("ACC", "7.5 s")
+        staging.stage("DEC", "8 s")
+        made.session.work.outcome = None
+        editor.apply()
+        assert "Wrote 2" in await written(made, editor)
+        for _ in range(2):  # those of the last write: INR is left alone
             assert staging.stage_old() == "2 old values are staged."
             assert {(edit.code, edit.new) for edit in staging.edits} == {("ACC", 30), ("DEC", 30)}
             staging.undo("DEC")

@@ -37,6 +37,7 @@ OUTCOME_WORDS = {
     EditOutcome.DONE: "written",
     EditOutcome.SENT: "sent",
     EditOutcome.WAITS: "not yet written",
+    EditOutcome.UNKNOWN: "not known",
 }
 """Results of an edit in a word; an edit with any other result was not written."""
 
@@ -104,7 +105,8 @@ class RestQuestion(KeyQuestion[bool]):
 def results_head(applied: Applied) -> str:
     """Return the number of edits that were written, and that are still staged."""
     done, failed = len(applied.written), len(applied.results) - len(applied.written)
-    head = f"Wrote {done}, all verified" if done else "Nothing written"
+    nothing = "Not known if written" if applied.unknown else "Nothing written"
+    head = f"Wrote {done}, all verified" if done else nothing
     return f"{head}. {failed} still staged." if failed else f"{head}."
 
 

@@ -191,7 +191,8 @@ class Editor:
         """Write the staged edits (default: all); return immediately."""
         staging = self.staging
         edits, held_back = staging.only(codes)
-        staging.results, self.applied = {}, None
+        staging.begin_write()
+        self.applied = None
 
         async def work(permit: Permit) -> str:
             applied = await apply_edits(
@@ -292,7 +293,8 @@ class Editor:
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
     """Describe the result of all edits, and the edits that stay staged."""
     done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
-    parts = [f"Wrote {done}, all verified." if done else "Nothing written."]
+    nothing = "Not known if written." if applied.unknown else "Nothing written."
+    parts = [f"Wrote {done}, all verified." if done else nothing]
     if left := list(dict.fromkeys((*failed, *staged))):
         parts.append(f"{len(left)} still staged: {first_of(left, LEFT_NAMED)}.")
     parts += [link.text for link in applied.links]

@@ -26,7 +26,7 @@ class Staging:
     results: dict[str, Result] = field(default_factory=dict)
     """Result of the last write of each parameter; none once it is staged again."""
     _before: dict[str, int] = field(default_factory=dict)
-    """Raw value of each written parameter before its last write."""
+    """Raw values before the last write of staged edits, by code."""
 
     @property
     def _raws(self) -> Mapping[str, int]:
@@ -116,6 +116,10 @@ class Staging:
             return edit.code in waits or (scale is not None and scale.parameter in waits)
 
         self.edits = Edits(tuple(edit for edit in left if stays(edit)))
+
+    def begin_write(self) -> None:
+        """Forget the results and the old values of the write before."""
+        self.results, self._before = {}, {}
 
     def take_result(self, result: Result) -> None:
         """Note the result of one edit."""
