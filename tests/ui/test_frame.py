@@ -12,11 +12,14 @@ from textual.pilot import Pilot
 
 from tests.sweeps import kept
 from tui.app import DrivePanelApp
+from tui.bus.errors import LineError
 from tui.screens.dialogs.question import Question
 from tui.screens.faults.screen import FaultsScreen
+from tui.screens.key_dispatcher import NOBODY_TO_STOP
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
 from tui.session.connect.open_line import demo_line
+from tui.session.work import OutcomeKind
 from tui.simulator import Simulation
 from tui.widgets.lines import Lines
 from tui.widgets.strip import FrameView
@@ -110,6 +113,23 @@ async def test_reply_to_a_key_stays_on_its_screen_and_a_trip_does_not() -> None:
         await made.on("3")
         await made.pilot.pause(0.6)
         assert "tripped: ObF" in made.shown("said")
+
+
+async def test_failed_work_and_a_stop_in_vain_are_shown_on_every_screen() -> None:
+    async with panel() as made:
+        console = made.app.chosen
+        assert console is not None
+        work = console.session.work
+        work.report(OutcomeKind.REFUSED, "It may have been written.", LineError("no reply"))
+        await made.until(lambda: "may have been written" in made.shown("said"))
+        await made.on("3")
+        await made.pilot.pause(0.6)
+        assert "may have been written" in made.shown("said")
+        made.app._warn(NOBODY_TO_STOP)
+        await made.until(lambda: "Nothing was stopped" in made.shown("said"))
+        await made.on("2")
+        await made.pilot.pause(0.6)
+        assert "Nothing was stopped" in made.shown("said")
 
 
 async def test_fault_is_new_until_faults_is_opened() -> None:

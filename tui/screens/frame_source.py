@@ -177,16 +177,28 @@ class FrameSource:
     def _event(self) -> Event | None:
         """Return the newest event that concerns the screen on top; None without one.
 
-        A reply to a key or to a command that was refused stays on the screen where it was shown
-        first. On others the newest of the events before it is shown.
+        A reply to a key stays on the screen where it was shown first. On others the newest of the
+        events before it is shown. The failure of a task is shown on
+        every screen.
         """
         newest, place = self._app.events.newest, self._app.place
         if newest is not self._bound[0]:
             self._bound = newest, place
-        if newest is None or not _is_reply(newest) or place == self._bound[1]:
+        if newest is None or not self._is_reply(newest) or place == self._bound[1]:
             return newest
-        before = (event for event in reversed(self._app.events.events) if not _is_reply(event))
+        before = (event for event in reversed(self._app.events.events) if not self._is_reply(event))
         return next(before, None)
+
+    def _is_reply(self, event: Event) -> bool:
+        """True if an event only replies to a key; False if it is about a drive, a write or a line.
+
+        A refusal without an error was sent nowhere. That of an older event is not known any more.
+        """
+        if event.kind != "refused":
+            return event.kind == "told" and event.device is None
+        consoles = (fleet.console(event.device) for fleet in self._app.fleets if event.device)
+        outcomes = (console.session.work.outcome for console in consoles if console is not None)
+        return all(o is None or o.text != event.text or o.error is None for o in outcomes)
 
     def _trouble_below(self, now: float) -> str:
         """The first trouble of the open lines that are not shown; empty if none."""
@@ -222,15 +234,6 @@ class FrameSource:
         does = reaction.name.lower() if reaction else UNKNOWN_REACTION
         text = NO_ANSWER_YET if first.left > 0 else NO_ANSWER_OVERDUE
         return text.format(device=first.device, silent=first.silent, left=first.left, does=does)
-
-
-REPLY_KINDS = frozenset({"told", "refused"})
-"""Kinds of events that reply to a key."""
-
-
-def _is_reply(event: Event) -> bool:
-    """True if an event only replies to a key on one screen; False if it is about a drive."""
-    return event.kind in REPLY_KINDS and (event.device is None or event.kind == "refused")
 
 
 def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:

@@ -162,16 +162,20 @@ class KeyDispatcher(HarmlessKeys):
             except Exception as error:
                 fleet.last_stop(error, chosen)
         if self.hearing:
-            carried_on(lambda: soon_in_loop(self, self.notify, NO_STOP_HERE))
+            carried_on(lambda: soon_in_loop(self, self._warn, NO_STOP_HERE))
         elif chosen is None:
             carried_on(lambda: soon_in_loop(self, self._tell_unreached))
+
+    def _warn(self, text: str) -> None:
+        """Report on every screen that a stop has stopped nothing."""
+        self.notify(text, severity="warning")
 
     def _tell_unreached(self) -> None:
         """Report drives that a stop of all did not reach, or that there is no drive."""
         strangers = [device for fleet in self.fleets for device in fleet.strangers]
         if not strangers:
             if not any(fleet.sessions for fleet in self.fleets):
-                self.tell(NOBODY_TO_STOP)
+                self._warn(NOBODY_TO_STOP)
         else:
             text = UNREACHED.format(", ".join(map(str, strangers)))
             self.events.add("failed", text)

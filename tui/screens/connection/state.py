@@ -323,7 +323,7 @@ class LineView(PanelScreen):
         watches = [self.app.fleet.line_watch.watch(device) for device in new]
         trip = all(watch and watch.trips for watch in watches)
         text = KEPT_FROM_TRIPPING if trip else KEPT_FROM_REACTING
-        self.app.events.add("told", text.format(which=which))
+        self.app.events.add("done", text.format(which=which))
 
 
 def _lines_title(width: int) -> list[Text]:

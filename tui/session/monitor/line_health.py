@@ -50,7 +50,7 @@ class LineHealth:
         self._poor = frozenset(poor)
         self.troubles = tuple(self._found(line, drives, before))
         if before and not self.troubles and line.share is not None:
-            return [("told", HEALTHY_AGAIN.format(percent(line.share).strip()))]
+            return [("done", HEALTHY_AGAIN.format(percent(line.share).strip()))]
         return [("alarm", trouble.text) for trouble in self.troubles if trouble.kind not in before]
 
     def forget(self) -> None:
