@@ -149,7 +149,7 @@ def _table_lines(view: View, room: Arrangement, table: WordTable) -> list[Text]:
 def bottom_lines(view: View, room: Arrangement, words: Sequence[Parameter]) -> list[Text]:
     """Return notices, the set bits of up to two words, and the alarms in the last row.
 
-    In a single row a notice takes precedence, then an alarm. A long notice gets more rows.
+    If there is one row, notices and an alarm still get rows of their own; words get none.
     """
     notices = notice_lines(view, room.width)
     figures = line_figures(view) if room.wide else Text("")
@@ -157,7 +157,7 @@ def bottom_lines(view: View, room: Arrangement, words: Sequence[Parameter]) -> l
     last.append(" ").append_text(figures)
     texts = notices + [word_line(view, word, room.width - 1) for word in shown_words(words)]
     if room.bottom == 1:
-        return notices or ([last] if has_alarm(view) or not texts else texts[:1])
+        return [*notices, last] if has_alarm(view) else notices or texts[:1] or [last]
     space = max(room.bottom - 1, len(notices))
     texts = texts[:space]
     return [*texts, *[Text("")] * (space - len(texts)), last]

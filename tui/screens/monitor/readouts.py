@@ -157,7 +157,9 @@ def _heading(
     text.append(f" {unit}", FAINT).append(" " if roomy else "")
     reading = view.reading(parameter.code) if parameter else None
     if reading is not None and reading.quality is not Quality.GOOD and reading.raw is not None:
-        return text, Text(f" {age_text(reading.age(view.now))} old ", STALE)
+        age = Text(f" {age_text(reading.age(view.now))} old ", STALE)
+        text.truncate(max(0, inner - age.cell_len))
+        return text, age
     if quantity == "output_frequency" and (wanted := _reference(view)) is not None:
         right = wanted.drawn(
             view.now,
@@ -171,8 +173,8 @@ def _heading(
 
 def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[Text]:
     """Return the extremes on the page of the curve; empty rows if the trend lacks the quantity."""
-    if quantity not in TREND_QUANTITIES or parameter is None:
-        return [Text()] * ROWS
+    if quantity not in TREND_QUANTITIES or parameter is None or view.page is not None:
+        return [Text()] * ROWS  # the cursor may hold an older page than the number beside them
     place = TREND_QUANTITIES.index(quantity)
     start, end = view.page_start, view.page_start + view.step.span
     seen = [

@@ -77,9 +77,8 @@ def _head(view: View, width: int) -> tuple[Text, list[Text]]:
         waits = "waiting for values" if view.line.status is LineStatus.CONNECTED else "connecting"
         return Text(waits, ALARM), []
     if snapshot.contact == "swapped":
-        why = "in each word: check the byte order of the gateway or converter"
         return Text("BYTES SWAPPED", ALARM), [
-            Text(line, PLAIN) for line in wrapped(why, width, MORE_ROWS)
+            Text(line, PLAIN) for line in wrapped(SWAPPED, width, MORE_ROWS)
         ]
     if view.lost:
         return _lost(view, "NO ANSWER", width)
@@ -104,8 +103,10 @@ def _lost(view: View, words: str, width: int) -> tuple[Text, list[Text]]:
     known = f"STATE UNKNOWN for {age}"
     reported = f"{known}, {KEY_TO_DIAGNOSE}"
     lines = [Text(short(reported if len(reported) <= width else known, width), ALARM)]
-    lines.append(Text(short(f"was {was}" if was else "", width), FAINT))
-    lines += [Text(line, ALARM) for line in wrapped(countdown(view), width, 2)]
+    reaction = [Text(line, ALARM) for line in wrapped(countdown(view), width, MORE_ROWS - 1)]
+    if len(lines) + len(reaction) < MORE_ROWS:
+        lines.append(Text(short(f"was {was}" if was else "", width), FAINT))
+    lines += reaction
     return Text(f" {words} ", FAULT_BLOCK), lines
 
 
