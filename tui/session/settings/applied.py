@@ -66,6 +66,11 @@ class Applied:
     """Codes that a person may still write after an earlier one has failed."""
 
     @property
+    def unknown(self) -> bool:
+        """True if an edit may have been written: its reply or its read-back is missing."""
+        return any(result.outcome is EditOutcome.UNKNOWN for result in self.results)
+
+    @property
     def written(self) -> tuple[Result, ...]:
         """The edits that the drive holds now."""
         return tuple(result for result in self.results if result.done)
