@@ -34,6 +34,9 @@ def marks(*snapshots: Snapshot) -> list[str]:
         ([FAULT, RUNNING], ["", "start"]),
         ([RUNNING, LOST, LOST, READY], ["", "lost", "", ""]),
         ([LOST, RUNNING, LOST], ["", "", "lost"]),
+        ([RUNNING, LOST, FAULT, FAULT], ["", "lost", "trip", ""]),
+        ([FAULT, LOST, FAULT], ["", "lost", ""]),
+        ([LOST, FAULT], ["", ""]),
     ],
 )
 def test_each_event_is_marked_once(snapshots: list[Snapshot], expected: list[str]) -> None:
@@ -64,6 +67,13 @@ def test_edit_is_marked_and_a_trip_matters_more() -> None:
         for snapshot, edits in ((RUNNING, 0), (RUNNING, 2), (RUNNING, 2), (FAULT, 3), (FAULT, 3))
     ]
     assert found == ["", "write", "", "trip", ""]
+
+
+def test_edit_during_a_lost_cycle_is_marked_afterwards() -> None:
+    marker = TrendMarker()
+    cycles = ((RUNNING, 0), (LOST, 1), (RUNNING, 1), (RUNNING, 1))
+    found = [marker.mark(snapshot, 50.0, edits) for snapshot, edits in cycles]
+    assert found == ["", "lost", "write", ""]
 
 
 def test_mark_is_kept_with_its_point_and_for_the_next_program() -> None:

@@ -123,7 +123,7 @@ class TrendMarker:
 
     def __init__(self) -> None:
         self._kind = ""
-        """Kind of the last state, empty before the first and after a failed cycle."""
+        """Kind of the last known state; empty before the first, and after an unknown one."""
         self._failed = True
         self._references: tuple[float | None, float | None] = (None, None)
         self._edits = 0
@@ -132,10 +132,10 @@ class TrendMarker:
         """Return the most urgent event since the last cycle; empty without one."""
         found = set(self._events(snapshot, reference, edits))
         self._failed = bool(snapshot.error)
-        kind = snapshot.state.kind
-        self._kind = "" if self._failed or kind == "unknown" else kind
         self._references = (self._references[1], reference)
-        self._edits = edits
+        if not self._failed:
+            kind = snapshot.state.kind
+            self._kind, self._edits = "" if kind == "unknown" else kind, edits
         return next((mark for mark in TREND_MARKS if mark in found), "")
 
     def _events(
@@ -149,7 +149,9 @@ class TrendMarker:
             yield "write"
         before, kind = self._kind, snapshot.state.kind
         if before and kind not in (before, "unknown"):
-            yield from _change(before, kind)
+            found = _change(before, kind)
+            # events of a drive that was not read are not known, except a fault that it now has
+            yield from (mark for mark in found if not self._failed or mark == "trip")
         earlier, last = self._references
         if reference is None or last is None or earlier != last:
             return  # an analog input changes with each cycle: only a step from rest is an event
