@@ -225,6 +225,17 @@ def test_check_reports_words_that_do_not_fit_and_search_works_anyway(
     assert next(iter(rows(FilterContext(profile), "all", "ramp"))) == "ACC"
 
 
+def test_packaged_words_of_codes_that_an_own_edition_lacks_are_skipped() -> None:
+    data = library.load("atv71").data
+    listed = tomli.loads((FOLDER / "atv71.toml").read_text("utf-8"))["topics"][0]["codes"][0]
+    kept = [parameter for parameter in data.parameters if parameter.code != listed]
+    edition = msgspec.structs.replace(data, parameters=kept)
+    with pytest.raises(ProfileError, match=f"there is no parameter '{listed}'"):
+        read_vocabulary(edition, (FOLDER.parent,))
+    topics = read_vocabulary(edition, (FOLDER.parent,), strict=False).topics
+    assert listed not in {code for topic in topics for code in topic.codes}
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_packaged_words_fit_their_family(family: str) -> None:
     data = library.load(family).data

@@ -210,5 +210,5 @@ def parameter_search(profile: Profile) -> ParameterSearch:
     try:
         vocabulary = read_vocabulary(profile.data, (user_folder(), packaged_folder()))
     except ProfileError:
-        vocabulary = read_vocabulary(profile.data, (packaged_folder(),))
+        vocabulary = read_vocabulary(profile.data, (packaged_folder(),), strict=False)
     return ParameterSearch(profile, vocabulary)

@@ -38,18 +38,20 @@ class Vocabulary(NamedTuple):
     """Words that describe no parameter, such as `of`."""
 
 
-def read_vocabulary(data: ProfileData, folders: Sequence[Path]) -> Vocabulary:
+def read_vocabulary(
+    data: ProfileData, folders: Sequence[Path], *, strict: bool = True
+) -> Vocabulary:
     """Return the words of a family: topics of all families with its own codes, then its own.
 
     `folders` hold profiles; files are sought in their folder `search`, the first found counts.
     The shared topics are in the last folder. Raises ProfileError with each fault, file and line.
     From a file that is not beside the profile (the first folder), codes that do not exist are
-    skipped: it belongs to another edition.
+    skipped: it belongs to another edition. If not `strict`, they are skipped from every file.
     """
     shared = decode_tables(source_text(folders[-1] / SEARCH_FOLDER / SHARED), SearchWords)
     known = {parameter.code for parameter in data.parameters}
     shared_ids = {topic.id for topic in shared.topics}
-    own = _family_topics(data.profile.id, folders, shared_ids, known)
+    own = _family_topics(data.profile.id, folders, shared_ids, known, strict=strict)
     found = []
     for topic in shared.topics:
         words, codes = _merged(own, topic.id, known)
@@ -71,7 +73,12 @@ def _merged(
 
 
 def _family_topics(
-    profile_id: str, folders: Sequence[Path], shared: Collection[str], known: Collection[str]
+    profile_id: str,
+    folders: Sequence[Path],
+    shared: Collection[str],
+    known: Collection[str],
+    *,
+    strict: bool,
 ) -> list[FamilyTopic]:
     """Return the rows of a family's file, then those of the family that it resembles."""
     path = _found(f"{profile_id}.toml", folders)
@@ -80,7 +87,7 @@ def _family_topics(
     source = source_text(path)
     family = decode_tables(source, FamilySearch)
     findings = list(_findings(family, shared, known))
-    if findings and path.parent.parent == folders[0]:
+    if strict and findings and path.parent.parent == folders[0]:
         lines = [
             f"{path}:{line_of(source, ('topics', index))}: {fault}" for index, fault in findings
         ]
