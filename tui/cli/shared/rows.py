@@ -89,7 +89,7 @@ def table_of(
             # a number that lost a digit would be another one
             table.add_column(column.title, justify=justify, no_wrap=True, min_width=widths[at])
         elif width is None:
-            table.add_column(column.title)
+            table.add_column(column.title, overflow="fold")
         else:
             others = sum(widths[other] for other in shown if other != at) + GAP * (len(shown) - 1)
             most = max(LEAST_FOLDED, min(widths[at], width - others))
