@@ -350,7 +350,7 @@ def test_silence_and_noise_are_reported() -> None:
         "3 bytes received, but no whole frame. Check the baud rate and the format." in noise.lines
     )
     both = Heard().say(READ, WORDS, b"\xff\x00\xff").rest()
-    assert "Outside frames: 3 bytes in 1 place" in both.lines
+    assert "Bytes outside frames: 3, in 1 place" in both.lines
 
 
 def test_scale_follows_values_seen_from_the_same_drive() -> None:

@@ -7,8 +7,8 @@ import time
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from tui.drive.sentences import counted
-from tui.session.command.stop_report import AT_THE_MACHINE
+from tui.drive.sentences import counted, sentence
+from tui.session.command.stop_report import AT_THE_MACHINE, NOT_STOPPED
 
 if TYPE_CHECKING:
     from tui.session.command.stop_report import StopReport
@@ -104,7 +104,8 @@ class LineStops:
             return report.text if report.text.endswith(".") else f"{report.text}."
         if not self.followed:
             return STANDSTILL_NOT_KNOWN
-        return f"NOT STOPPED after {STOPPED_WITHIN:.0f} s: {report.text}. {AT_THE_MACHINE}"
+        why = sentence(report.text.removeprefix(NOT_STOPPED))
+        return f"NOT STOPPED after {STOPPED_WITHIN:.0f} s: {why} {AT_THE_MACHINE}"
 
 
 class LastStops(NamedTuple):

@@ -33,8 +33,8 @@ WOULD_TAKE_TEXTS = (
     "{count} requests would take {milliseconds:.1f} ms: {reads}",
 )
 OUTSIDE_TEXTS = (
-    "Outside frames: {bytes} bytes in 1 place (noise, collisions, cut frames).",
-    "Outside frames: {bytes} bytes in {count} places (noise, collisions, cut frames).",
+    "Bytes outside frames: {bytes}, in 1 place (noise, collisions, cut frames).",
+    "Bytes outside frames: {bytes}, in {count} places (noise, collisions, cut frames).",
 )
 SECOND_MASTER_TEXTS = (
     "A SECOND MASTER? 1 request began while another request still waited for its answer.",

@@ -27,6 +27,7 @@ from .watching import latest_of, learned_timeout
 RUN_POLL_INTERVAL = 0.05
 CYCLES_AT_REST = 2
 """Cycles in a row that show a motor at rest before it counts as stopped on its own."""
+UNNAMED_SOURCE = "another source"
 STOPS_THAT_MAY_FAIL = 2
 """Stops that may fail on a line without trouble before the motor is reported as running."""
 
@@ -167,7 +168,7 @@ class MotorRun:
         """Name the source of a stop since the run began; empty for none or one of this program."""
         work = self.console.session.work
         is_other = work.stops > self._stops and not self.is_stopped_here()
-        return work.stopped_by if is_other else ""
+        return (work.stopped_by or UNNAMED_SOURCE) if is_other else ""
 
     def _at_rest(self, latest: Snapshot) -> bool:
         """Return True if the motor is not running; a drive may stay in its quick stop at 0 Hz."""
