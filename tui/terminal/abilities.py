@@ -33,7 +33,7 @@ NAMED_COLORS: tuple[tuple[str, ColorSystem], ...] = (
 )
 """Colors by a part of TERM, for terminals that terminfo does not know."""
 
-WITHOUT_BRAILLE = ("linux", "cons25", "vt", "pcansi", "sco")
+WITHOUT_BRAILLE = ("linux", "cons25", "vt1", "vt2", "vt3", "vt4", "vt5", "pcansi", "sco")
 """Beginnings of TERM of consoles whose fonts have no braille."""
 
 LOCALE = ("LC_ALL", "LC_CTYPE", "LANG")
