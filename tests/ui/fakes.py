@@ -12,6 +12,7 @@ from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
 from tui.bus.api import (
+    DeviceCounters,
     DeviceState,
     Frame,
     LastMinute,
@@ -163,7 +164,8 @@ class StillArming(Arming):
 
 COUNTED = LineCounters(
     requests=1204, replies=1203, timeouts=1, bytes_out=9632, bytes_in=30120, busy_seconds=31.0,
-    minute=LastMinute(good=119, lost=1),
+    minute=LastMinute(good=419, lost=1),
+    devices={2: DeviceCounters(minute=LastMinute(good=119, lost=1))},
 )  # fmt: skip
 FRAMES = (
     Frame(NOW - 0.6, "out", bytes.fromhex("02030c1e0004276c")),

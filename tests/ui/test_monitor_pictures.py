@@ -119,7 +119,7 @@ def panel(
     app.opened, app.read_only = fakes.opened(scene.line), scene.read_only
     app.low_bandwidth = scene.low_bandwidth
     console = fakes.console_of(snapshot, scene.line, family=scene.family, armed=scene.armed)
-    console.session.line.heard = fakes.NOW - scene.heard  # type: ignore[attr-defined]
+    cast("fakes.StillLine", console.session.line)._heard = fakes.NOW - scene.heard
     if scene.reference is not None:
         console.session.image.confirm("LFR", scene.reference, fakes.NOW)
     identity = replace(fakes.ATV71, profile=scene.family)

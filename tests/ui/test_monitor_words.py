@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
 
-from tui.bus.api import LastMinute
+from tui.bus.api import DeviceCounters, LastMinute, LineCounters
 from tui.drive.orders import MOVING_ORDERS
 from tui.drive.profile import library
 from tui.drive.profile.schema import Bit
 from tui.screens.command.control import Control, hindrance
 from tui.screens.monitor.assembly import NOTICE_ROWS, framed_state, notice_lines
+from tui.screens.monitor.readouts import readout_lines
 from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
 from tui.screens.monitor.state import _timeout, countdown, state_lines
+from tui.screens.monitor.view import View
 from tui.screens.monitor.words import (
     WordPage,
     _bit_line,
@@ -215,26 +218,57 @@ def test_name_of_a_bit_is_whole_while_a_column_is_empty(code: str) -> None:
     assert missing == []
 
 
-def test_answers_of_the_last_minute_have_the_lower_edge() -> None:
+def test_answers_of_this_drive_in_the_last_minute_have_the_lower_edge() -> None:
     view = view_of(ATV71, fakes.RUNNING)
+    line_minute = LastMinute(good=600, lost=3)
     for minute, text, style in (
         (LastMinute(good=119, lost=1), "119/120 in 60 s", PLAIN),
-        (LastMinute(good=100, lost=5, damaged=15, silent=9), "100/120 in 60 s", ALARM),
+        (LastMinute(good=100, lost=5, damaged=15, silent=9), "100/129 in 60 s", ALARM),
         (LastMinute(), "-----", FAINT),
     ):
-        counters = replace(view.counters, timeouts=1, searched=17, minute=minute)
+        counters = answers_of(view, minute, line_minute)
         for shown in (view, replace(view, snapshot=fakes.snapshot_of(ATV71, fakes.FAULT))):
-            line = state_lines(replace(shown, counters=counters), 25)[-1]
-            assert line.plain.split(maxsplit=1) == ["Answers", text]
-            assert line.spans[-1].style == style
+            for width, label in ((25, "Answers"), (30, "Drive answers")):
+                line = state_lines(replace(shown, counters=counters), width)[-1]
+                assert line.plain == f"{label:<{width - len(text)}}{text}"
+                assert line.spans[-1].style == style
+
+
+def answers_of(view: View, drive: LastMinute, line: LastMinute) -> LineCounters:
+    return replace(
+        view.counters,
+        timeouts=1,
+        searched=17,
+        minute=line,
+        devices={view.device: DeviceCounters(minute=drive), 9: DeviceCounters(minute=line)},
+    )
+
+
+def test_silent_drive_has_no_answers_while_the_line_has() -> None:
+    error = "Device 2 did not answer (function 3)."
+    snapshot = fakes.snapshot_of(ATV71, fakes.RUNNING, age=14.0, error=error)
+    view = replace(view_of(ATV71, fakes.RUNNING), snapshot=snapshot)
+    counters = answers_of(view, LastMinute(silent=6), LastMinute(good=600))
+    lines = state_lines(replace(view, counters=counters), 25)
+    assert lines[0].plain == " NO ANSWER "
+    assert lines[-1].plain == "Answers       0/6 in 60 s"
+    assert lines[-1].spans[-1].style == ALARM
 
 
 def test_age_of_the_last_poll_is_beside_an_active_timeout() -> None:
     view = replace(view_of(ATV71, fakes.RUNNING), watch=TimeoutWatch(10.0, None, active=True))
-    for heard, text in ((0.4, "<1 s"), (3.2, "3 s"), (9.0, "9 s")):
-        line = state_lines(replace(view, heard=fakes.NOW - heard), 25)[3]
-        assert line.plain == f"{'Timeout':<{25 - len(text) - 13}}10 s, polled {text}"
-        assert (line.spans[-1].style == STALE) == (heard == 9.0)
+    for heard, text, narrow in (
+        (0.4, "polled <1 s ago", "polled now"),
+        (3.2, "polled 3 s ago", "6 s left"),
+        (9.0, "polled 9 s ago", "1 s left"),
+        (10.2, "polled 10 s ago", "expired"),
+    ):
+        for width, words in ((30, text), (25, narrow)):
+            line = state_lines(replace(view, heard=fakes.NOW - heard), width)[3]
+            assert line.plain.startswith("Timeout ")
+            assert line.plain.endswith(f" 10 s, {words}")
+            assert line.cell_len == width
+            assert (line.spans[-1].style == STALE) == (heard >= 9.0)
 
 
 def _drawn(bit: Bit, raw: int) -> tuple[str, bool]:
@@ -334,19 +368,28 @@ def test_reaction_of_an_unpolled_drive_is_counted_down(heard: float, text: str) 
 @pytest.mark.parametrize(
     ("age", "text"),
     [
-        (-1.0, "<1 s"),
-        (0.99, "<1 s"),
-        (1.0, "1 s"),
-        (99.0, "99 s"),
-        (100.0, "2m"),
-        (5999.0, "100m"),
-        (6000.0, "2h"),
+        (-1.0, "<1 s ago"),
+        (0.99, "<1 s ago"),
+        (1.0, "1 s ago"),
+        (99.0, "99 s ago"),
+        (100.0, "2m ago"),
+        (5999.0, "100m ago"),
+        (6000.0, "2h ago"),
     ],
 )
 def test_timeout_is_shown_with_the_age_of_the_last_answer(age: float, text: str) -> None:
     watch = TimeoutWatch(10.0, None)
     view = replace(view_of(ATV71, fakes.RUNNING), now=9000.0, heard=9000.0 - age, watch=watch)
     assert _timeout(view, 40)[0] == f"10 s, polled {text}"
+
+
+def test_extremes_name_the_seconds_that_they_cover() -> None:
+    view = view_of(ATV71, fakes.RUNNING)
+    just_turned, full = view, replace(view, apart=19.0)
+    just_opened = replace(full, trend=view.trend[-5:])
+    for shown, covered in ((just_turned, "39 s"), (full, "58 s"), (just_opened, "4 s")):
+        row = readout_lines(shown, 50)[3].plain
+        assert re.findall(r"\d+ s", row) == [covered]
 
 
 @pytest.mark.parametrize(("age", "late"), [(5.0, False), (5.1, True)])

@@ -43,6 +43,7 @@ def view_of(profile: Profile, raws: dict[str, int], age: float = 0.1) -> View:
         profile=profile,
         snapshot=snapshot,
         line=line.state,
+        device=2,
         counters=line.counters,
         trend=tuple(TrendPoint(fakes.NOW - i, (i * 1.0, None, 50.0)) for i in range(60, 0, -1)),
         period=0.5,

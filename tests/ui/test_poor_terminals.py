@@ -69,3 +69,24 @@ async def test_no_screen_has_colors_without_color_support(
             ]
             assert not [style for style in styles if style.color or style.bgcolor]
             assert any(style.reverse for style in styles), "what is chosen is seen"
+
+
+@pytest.mark.parametrize(("terminal", "has_grid"), [("sixteen colors", True), ("no colors", False)])
+async def test_curve_has_no_grid_without_colors(
+    terminal: str, has_grid: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, screen = panel(SCENES["running"], monkeypatch, POOR[terminal])
+    async with app.run_test(size=(80, 24)) as pilot:
+        await show(app, screen, (), pilot)
+        rows = [strip.text for strip in app.screen._compositor.render_strips()]
+        assert any("·" in row[6:72] for row in rows[9:18]) is has_grid
+
+
+async def test_reference_of_a_plain_bar_differs_from_a_tick(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app, screen = panel(SCENES["running"], monkeypatch, POOR["plain signs"])
+    async with app.run_test(size=(80, 24)) as pilot:
+        await show(app, screen, (), pilot)
+        rows = [strip.text for strip in app.screen._compositor.render_strips()]
+        assert [row for row in rows if "+=============#--+ 60" in row]

@@ -124,7 +124,7 @@ def _brightness(color: RichColor) -> float:
 NO_SIGN: Final = "?"
 PLAIN_SIGNS: Final = {
     **dict.fromkeys("─╴╶╸╺╌┄", "-"),
-    **dict.fromkeys("│┃╷╵║┆▏▎▍▌▐▕", "|"),
+    **dict.fromkeys("│╷╵║┆▏▎▍▌▐▕", "|"),
     **dict.fromkeys("┌┐└┘├┤┬┴┼╭╮╯╰", "+"),
     **dict.fromkeys("━═▔▀▄▅", "="),
     **dict.fromkeys("▁▂▃", "_"),
@@ -142,6 +142,7 @@ PLAIN_SIGNS: Final = {
     **dict.fromkeys("×", "x"),
     "±": "+",
     "◆": "+",
+    "┃": "#",
     "⠒": "-",
     "⠂": "=",
     "■": "!",

@@ -59,6 +59,7 @@ class LeanApp(App[None]):
         """True if the terminal has ASCII characters only, or few more."""
         self.has_braille = abilities.braille
         """True if its font has the dots of braille."""
+        self.has_colors = abilities.colors is not None
         self._instead = filters_for(abilities)
         self._picture = Picture(erases=abilities.erases)
         self._pacing = Pacing(slow=slow)

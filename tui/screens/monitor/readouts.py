@@ -22,7 +22,7 @@ from tui.widgets.gauge import gauge
 from tui.widgets.palette import BAR, BAR_REST, FAINT, LINE, PLAIN, STALE, STRONG, age_text
 from tui.widgets.readout import ROWS, big, dashes, readout_cells
 
-from .curves import bar_end, points_of_page, span_text
+from .curves import bar_end, points_of_page
 from .view import View, bar_number, decimal_places, directed, end_of
 
 SIGN_CELLS = 5
@@ -172,23 +172,29 @@ def _heading(
 
 
 def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[Text]:
-    """Return the extremes on the page of the curve; empty rows if the trend lacks the quantity."""
+    """Return the extremes on the page of the curve, and the seconds from its first to last value.
+
+    A page that has just turned covers less than its span. The rows are empty if the trend lacks
+    the quantity.
+    """
     if quantity not in TREND_QUANTITIES or parameter is None or view.page is not None:
         return [Text()] * ROWS  # the cursor may hold an older page than the number beside them
     place = TREND_QUANTITIES.index(quantity)
     start, end = view.page_start, view.page_start + view.step.span
     seen = [
-        value
+        (value, point.time)
         for point in points_of_page(view)
         if start <= point.time < end and (value := point.values[place]) is not None
     ]
     if not seen:
         return [Text()] * ROWS
     digits = decimal_places(parameter)
+    highest, lowest = max(seen)[0], min(seen)[0]
+    covered = f"{seen[-1][1] - seen[0][1]:.0f} s"
     return [
-        Text("max", FAINT).append(f"{max(seen):>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
-        Text("min", FAINT).append(f"{min(seen):>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
-        Text(f"{span_text(view.step.span):>{SIDE_CELLS - 1}} ", FAINT),
+        Text("max", FAINT).append(f"{highest:>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
+        Text("min", FAINT).append(f"{lowest:>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
+        Text(f"{covered:>{SIDE_CELLS - 1}} ", FAINT),
     ]
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 from rich.style import Style
 from rich.text import Text
 
-from tui.bus.api import LineStatus
+from tui.bus.api import DeviceCounters, LineStatus
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.safety import WARNED_AT_SHARE
@@ -56,7 +58,7 @@ def state_lines(view: View, width: int) -> list[Text]:
         _channel(view, "Command", "command_channel", width),
         _channel(view, "Reference", "reference_channel", width),
         _pair("Timeout", *_timeout(view, width), width),
-        _pair("Answers", *_answers(view), width),
+        _answers(view, width),
     ]
     lines = [head, *more[:MORE_ROWS], *rows[len(more[:MORE_ROWS]) :]]
     for line in lines:
@@ -208,30 +210,45 @@ def _timeout(view: View, width: int) -> tuple[str, Style]:
         return "none known", FAINT
     text = f"{watch.timeout:g} s"
     if watch.active:
-        return _polled(view, text, watch.timeout)
+        return _polled(view, text, watch.timeout, width - STATE_LABEL_CELLS)
     if not watch.acts:
         return "off", FAINT
     whole = f"{text}, starts when commanded"
     return whole if width >= STATE_LABEL_CELLS + len(whole) else f"{text}, off", FAINT
 
 
-def _polled(view: View, text: str, timeout: float) -> tuple[str, Style]:
-    """Return a timeout with the age of the last answer in whole seconds, so it changes rarely."""
+def _polled(view: View, text: str, timeout: float, cells: int) -> tuple[str, Style]:
+    """Return a timeout with the age of the last answer in whole seconds, so it changes rarely.
+
+    If `cells` are too few for the age, the text has the seconds until the timeout.
+    """
     if view.heard is None:
         return text, PLAIN
     age = max(0.0, view.now - view.heard)
     hungry = age > WARNED_AT_SHARE * timeout
+    style = STALE if hungry or view.lost else PLAIN
     polled = "<1 s" if age < 1 else f"{age:.0f} s" if age < 100 else age_text(age)
-    return f"{text}, polled {polled}", STALE if hungry or view.lost else PLAIN
+    whole = f"{text}, polled {polled} ago"
+    if len(whole) <= cells:
+        return whole, style
+    left = math.floor(timeout - age)
+    briefly = "polled now" if age < 1 else f"{left} s left" if left > 0 else "expired"
+    return f"{text}, {briefly}", style
 
 
-def _answers(view: View) -> tuple[str, Style]:
-    """Return the line's good replies of the last 60 s, out of good, lost and damaged ones."""
-    minute = view.counters.minute
-    if minute.share is None:
-        return NOT_AVAILABLE, FAINT
-    poor = minute.share < POOR and minute.replies >= LEAST_REPLIES
-    return f"{minute.good}/{minute.replies} in 60 s", ALARM if poor else PLAIN
+def _answers(view: View, width: int) -> Text:
+    """Return the row with this drive's good answers to requests of the last 60 s.
+
+    They are those to every program on the line. Requests that it did not answer count too.
+    """
+    drive = view.counters.devices.get(view.device, DeviceCounters()).minute
+    share, requests = drive.whole_share, drive.replies + drive.silent
+    text = f"{drive.good}/{requests} in 60 s"
+    label = "Drive answers" if len(f"Drive answers {text:<15}") <= width else "Answers"
+    if share is None:
+        return _pair(label, NOT_AVAILABLE, FAINT, width)
+    poor = share < POOR and (requests >= LEAST_REPLIES or view.lost)
+    return _pair(label, text, ALARM if poor else PLAIN, width)
 
 
 def countdown(view: View) -> str:

@@ -38,6 +38,8 @@ class View:
     profile: Profile
     snapshot: Snapshot | None
     line: LineState
+    device: int
+    """Address of the drive."""
     counters: LineCounters
     trend: tuple[TrendPoint, ...]
     period: float
@@ -47,6 +49,8 @@ class View:
     """True if only ASCII signs are drawn."""
     braille: bool = True
     """True if the terminal can show braille."""
+    colored: bool = True
+    """True if the terminal has colors; without them, a grid looks like part of a curve."""
     watch: TimeoutWatch | None = None
     """The drive's communication timeout; None if none is known."""
     heard: float | None = None
@@ -87,7 +91,8 @@ class View:
     @property
     def signs(self) -> CurveSigns:
         """Characters for curves that the terminal can show."""
-        return ASCII_SIGNS if self.plain else BRAILLE if self.braille else BLOCKS
+        signs = ASCII_SIGNS if self.plain else BRAILLE if self.braille else BLOCKS
+        return signs if self.colored else signs._replace(grid=" ")
 
     @property
     def page_start(self) -> float:
