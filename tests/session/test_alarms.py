@@ -55,8 +55,10 @@ def test_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
     bench.now = 60.0
     assert bench.take({1: RUNS, 3: tripped(OBF), 17: tripped(OLF)})
     assert [fault.device for fault in bench.alarms.active] == [17, 3]
-    assert bench.output[0] == "17 fault: tripped: OLF Motor overload."
-    assert bench.output[1].startswith("3 fault: tripped: ObF Overbraking; drive 17 tripped first, ")
+    assert bench.output[0] == "17 fault: Tripped on OLF Motor overload."
+    assert bench.output[1].startswith(
+        "3 fault: Tripped on ObF Overbraking. Drive 17 tripped first, at "
+    )
     assert bench.kept == [(17, "OLF", "tripped"), (3, "ObF", "tripped")]
 
 
@@ -91,7 +93,7 @@ def test_fault_code_read_later_is_reported_without_a_second_bell(bench: Bench) -
     assert bench.take({3: tripped(None)})
     assert not bench.take({3: tripped(OBF)})
     assert [fault.code for fault in bench.alarms.active] == ["ObF"]
-    assert bench.output[-1] == "3 fault: the fault is ObF Overbraking."
+    assert bench.output[-1] == "3 fault: The fault is ObF Overbraking."
 
 
 def test_different_fault_of_the_same_drive_is_new(bench: Bench) -> None:
@@ -103,7 +105,7 @@ def test_fault_present_at_the_first_read_is_not_a_trip(bench: Bench) -> None:
     bench.now = 30.0
     assert bench.take({3: tripped(OBF)})
     assert bench.kept == [(3, "ObF", "seen")]
-    assert bench.output == ["3 fault: in fault when first seen: ObF Overbraking."]
+    assert bench.output == ["3 fault: Already tripped on ObF Overbraking when first seen."]
     (fault,) = bench.alarms.active
     assert not fault.tripped
     assert fault.when.startswith("seen since ")

@@ -279,7 +279,7 @@ async def test_trip_has_one_time_on_every_screen() -> None:
         record = fleet.consoles[0].recorder.latest
         assert record is not None
         assert fault.wall == record.wall
-        (event,) = [item for item in made.app.events.events if item.text.startswith("tripped:")]
+        (event,) = [item for item in made.app.events.events if item.text.startswith("Tripped on")]
         assert event.wall == fault.wall
         await made.pilot.press("5")
         await until(made.pilot, lambda: f"{fault.when}, last read " in shown(made.app, "doctor"))

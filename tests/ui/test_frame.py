@@ -92,7 +92,7 @@ async def test_trip_is_shown_in_the_status_bar_and_over_dialogs(key: str) -> Non
         await made.pilot.press(key)
         made.simulation.drive(1).provoke("ObF")
         await made.until(lambda: "FAULT ObF" in made.shown("strip"))
-        await made.until(lambda: "tripped: ObF" in made.shown("said"))
+        await made.until(lambda: "Tripped on ObF" in made.shown("said"))
         assert "1 fault" in made.shown("strip")
         assert made.bells == [None]  # type: ignore[attr-defined]
 
@@ -109,10 +109,10 @@ async def test_reply_to_a_key_stays_on_its_screen_and_a_trip_does_not() -> None:
         await made.on("2")
         await made.until(lambda: "Not armed" in made.shown("said"))
         made.simulation.drive(1).provoke("ObF")
-        await made.until(lambda: "tripped: ObF" in made.shown("said"))
+        await made.until(lambda: "Tripped on ObF" in made.shown("said"))
         await made.on("3")
         await made.pilot.pause(0.6)
-        assert "tripped: ObF" in made.shown("said")
+        assert "Tripped on ObF" in made.shown("said")
 
 
 async def test_failed_work_and_a_stop_in_vain_are_shown_on_every_screen() -> None:

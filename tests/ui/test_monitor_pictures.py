@@ -133,7 +133,7 @@ def panel(
     app.events = EventLog(lambda: WALL)
     if snapshot is not None and snapshot.state.kind == "fault":
         app.fleet.alarms.take({2: snapshot.state}, watch.onsets.by_device)
-        app.events.add("fault", "tripped: ObF Overbraking.", 2)
+        app.events.add("fault", "Tripped on ObF Overbraking.", 2)
     elif scene.armed is not None:
         app.events.add("told", "Armed for one minute.", 2)
     fakes.choose(app, console)

@@ -228,8 +228,6 @@ def with_drive(event: Event) -> str:
     """The text of an event, with its drive."""
     if event.device is None:
         return event.text
-    if event.kind == "fault":
-        return f"Drive {event.device} {event.text}"
     if event.text.startswith(NOT_STOPPED):
         return f"{NOT_STOPPED_HEAD}, drive {event.device}: {event.text.removeprefix(NOT_STOPPED)}"
     return f"Drive {event.device}: {event.text}"

@@ -117,7 +117,7 @@ class LineAlarms:
             self._recorded.pop(device, None)
             if was is not None:
                 del self._active[device]
-                self._events.add("done", f"{_called(was)} is reset.", device)
+                self._events.add("done", _reset_text(was), device)
                 self._record(was, "reset")
             return False
         fault = state.fault
@@ -127,7 +127,7 @@ class LineAlarms:
         if was is not None and not was.code:
             # the code may be read a cycle after the state
             self._active[device] = replace(was, code=code, name=name)
-            self._events.add("fault", f"the fault is {_called(self._active[device])}.", device)
+            self._events.add("fault", f"The fault is {_called(self._active[device])}.", device)
             return False
         first = next(iter(self._active.values()), None)
         onset = onsets.get(device)
@@ -153,10 +153,15 @@ def _called(fault: PresentFault) -> str:
     return f"{fault.code} {fault.name}".strip() or "a fault whose code was not read"
 
 
-_TRIPPED = "tripped: {fault}."
-_TRIPPED_AFTER_FAULT = "tripped: {fault}; drive {device} was in fault before."
-_TRIPPED_AFTER_TRIP = "tripped: {fault}; drive {device} tripped first, {at}."
-_SEEN = "in fault when first seen: {fault}."
+def _reset_text(fault: PresentFault) -> str:
+    named = f"{fault.code} {fault.name}".strip()
+    return f"{named} is reset." if named else "The fault is reset. Its code was not read."
+
+
+_TRIPPED = "Tripped on {fault}."
+_TRIPPED_AFTER_FAULT = "Tripped on {fault}. Drive {device} was in fault before."
+_TRIPPED_AFTER_TRIP = "Tripped on {fault}. Drive {device} tripped first, at {at}."
+_SEEN = "Already tripped on {fault} when first seen."
 
 
 def _onset_text(first: PresentFault | None, now: PresentFault) -> str:
