@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import time
 
 import pytest
@@ -14,7 +15,8 @@ from tui.cli.shared.say import Messages
 from tui.cli.shared.sets import ResultTelling, status_of_results
 from tui.drive.settings.memory_orders import MemoryRefused
 from tui.session.read import retrying_reader
-from tui.session.settings.applied import Applied, EditOutcome, Result
+from tui.session.settings import eeprom
+from tui.session.settings.applied import Applied, EditOutcome, Result, done_text
 from tui.session.settings.apply import apply_edits
 from tui.session.settings.eeprom import factory_reset, save_to_eeprom
 from tui.simulator import FaultRates
@@ -111,6 +113,17 @@ async def test_remaining_edits_wait_for_confirmation_after_a_failure() -> None:
         assert applied.written == ()
         assert len(applied.left) == 4
         assert made.writes() == []
+
+
+async def test_value_that_the_drive_already_holds_does_not_count_as_written() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s", DEC="7 s", HSP="40")
+        made.drive.set("ACC", 50)
+        applied = await made.write(edits)
+        assert "already holds" in text(applied, "ACC")
+        assert all(result.done for result in applied.results)
+        assert done_text(applied.results) == "Wrote 2, all verified. Already held: 1."
+        assert 9001 not in [register for register, _ in made.writes()]
 
 
 async def test_change_by_another_source_is_not_overwritten() -> None:
@@ -383,11 +396,22 @@ async def test_factory_reset_restores_factory_settings(family: str, confirmed: s
             made.session, made.journal, made.permit(), confirmed=confirmed
         )
         assert "restored in working memory" in reported
+        assert re.search(r"Checked [1-9]\d* settings; all have their factory value\.", reported)
         factory = made.profile["SP2"].factory
         assert (made.drive.raw("ACC"), made.drive.raw("SP2")) == (30, factory)
         assert made.drive.raw("LAC") == 0
         made.drive.power_cycle()
         assert made.drive.raw("ACC") == 99
+
+
+async def test_factory_values_that_are_not_known_are_not_reported_as_held(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(eeprom, "factory_raw", lambda *_: None)
+    with bench("atv312") as made:
+        reported = await factory_reset(made.session, made.journal, made.permit())
+        assert "all have their factory value" not in reported
+        assert re.search(r"Not checked: [1-9]\d* settings", reported)
 
 
 async def test_unverified_command_needs_confirmation() -> None:

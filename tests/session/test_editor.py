@@ -90,6 +90,17 @@ async def test_selected_parameters_are_read_first(family: str) -> None:
             rows(editor.facts, chosen, "a")
 
 
+async def test_only_edits_that_were_sent_are_counted_for_the_curve() -> None:
+    async with editing("atv71") as (made, editor):
+        await read(made, editor, "ACC", "DEC")
+        editor.staging.stage("ACC", "5")
+        editor.staging.stage("DEC", "7")
+        made.drive.set("ACC", 50)
+        editor.apply()
+        assert await written(made, editor) == "Wrote 1, all verified. Already held: 1."
+        assert made.session.edits_written == 1
+
+
 async def test_refused_edit_stays_staged_with_its_reason() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "HSP", "LSP", "TFR")

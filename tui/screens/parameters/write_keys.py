@@ -19,7 +19,7 @@ from tui.drive.settings.limits import edit_problems
 from tui.drive.settings.writable import cuts_line
 from tui.drive.settings.write_sequence import ordered
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.settings.applied import Applied, EditOutcome, Result
+from tui.session.settings.applied import Applied, EditOutcome, Result, done_text
 from tui.session.settings.editor import Editor
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain
@@ -104,10 +104,10 @@ class RestQuestion(KeyQuestion[bool]):
 
 def results_head(applied: Applied) -> str:
     """Return the number of edits that were written, and that are still staged."""
-    done, failed = len(applied.written), len(applied.results) - len(applied.written)
-    nothing = "Not known if written" if applied.unknown else "Nothing written"
-    head = f"Wrote {done}, all verified" if done else nothing
-    return f"{head}. {failed} still staged." if failed else f"{head}."
+    failed = len(applied.results) - len(applied.written)
+    nothing = "Not known if written." if applied.unknown else "Nothing written."
+    head = done_text(applied.written) or nothing
+    return f"{head} {failed} still staged." if failed else head
 
 
 def results_table(applied: Applied) -> Table:

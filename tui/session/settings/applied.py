@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -38,6 +38,8 @@ class Result:
     held: int | None = None
     voided: bool = False
     """True if it was not sent because of a stop or the end of arming."""
+    unchanged: bool = False
+    """True if nothing was sent, because the drive already held the value."""
 
     @property
     def done(self) -> bool:
@@ -74,6 +76,18 @@ class Applied:
     def written(self) -> tuple[Result, ...]:
         """The edits that the drive holds now."""
         return tuple(result for result in self.results if result.done)
+
+
+def done_text(done: Iterable[Result]) -> str:
+    """Return how many of these edits were written, only sent, or already held; empty if none."""
+    results = list(done)
+    unchanged = sum(result.unchanged for result in results)
+    sent = sum(result.outcome is EditOutcome.SENT for result in results)
+    written = len(results) - sent - unchanged
+    parts = [f"Wrote {written}, all verified."] if written else []
+    parts += [f"Sent {sent}, not verified."] if sent else []
+    parts += [f"Already held: {unchanged}."] if unchanged else []
+    return " ".join(parts)
 
 
 WriteProgress = Callable[[int, int, Result], None]

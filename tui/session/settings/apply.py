@@ -179,7 +179,8 @@ class _Work:
             if profile[edit.code].storage == "ram-until-saved" and edit.code not in unsaved:
                 # written by another source: whether it is saved is not known
                 self.session.unsaved_settings.note_write(edit.code, None, held)
-            return Result(edit, EditOutcome.DONE, f"{edit.code} already holds {edit.text}.", held)
+            text = f"{edit.code} already holds {edit.text}."
+            return Result(edit, EditOutcome.DONE, text, held, unchanged=True)
         if not self._means(edit) or (edit.old is not None and held != edit.old):
             return Result(edit, EditOutcome.CHANGED, self._changed_text(edit, held), held)
         return None

@@ -29,7 +29,7 @@ from ..paths import state_folder
 from ..read.retrying_reader import RetryingReader
 from ..stored import store_json, stored_json
 from ..work import Outcome, OutcomeKind, Permit, Task
-from .applied import Applied, LinkChange, Result
+from .applied import Applied, LinkChange, Result, done_text
 from .apply import apply_edits
 from .eeprom import factory_reset, save_to_eeprom
 from .staging import Staging
@@ -217,19 +217,19 @@ class Editor:
 
     def _applied(self, applied: Applied) -> None:
         self._mark(self.marks.edited([result.edit.code for result in applied.written]))
-        self.session.edits_written += len(applied.written)
+        self.session.edits_written += _count_sent(applied.written)
         self.waits_for_reset |= set(applied.after_reset)
         self.moved = next((link for link in applied.links if link.at_once), None)
 
     def _cut_short(self) -> str:
         """After a stop, unstage what the drive holds, and keep the rest."""
         done = self.staging.drop_written()
-        self._mark(self.marks.edited(done))
-        self.session.edits_written += len(done)
+        self._mark(self.marks.edited([result.edit.code for result in done]))
+        self.session.edits_written += _count_sent(done)
         with suppress(LineError):
             self.session.line.spawn(self._see_what_is_held, f"edits {self.session.device}")
         left = len(self.staging.edits)
-        return f"Wrote {len(done)}, all verified. {left} still staged." if left else ""
+        return f"{done_text(done) or 'Nothing written.'} {left} still staged." if left else ""
 
     async def _see_what_is_held(self) -> None:
         """Read the edit that a stop has interrupted: its result is not known."""
@@ -290,11 +290,15 @@ class Editor:
         self.session.work.report(kind, text)
 
 
+def _count_sent(done: Iterable[Result]) -> int:
+    return sum(not result.unchanged for result in done)
+
+
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
     """Describe the result of all edits, and the edits that stay staged."""
-    done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
+    failed = [result.edit.code for result in applied.results if not result.done]
     nothing = "Not known if written." if applied.unknown else "Nothing written."
-    parts = [f"Wrote {done}, all verified." if done else nothing]
+    parts = [done_text(applied.written) or nothing]
     if left := list(dict.fromkeys((*failed, *staged))):
         parts.append(f"{len(left)} still staged: {first_of(left, LEFT_NAMED)}.")
     parts += [link.text for link in applied.links]

@@ -8,7 +8,7 @@ from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import MemoryOrder
 from tui.drive.sentences import first_of
-from tui.drive.settings.factory import factory_is_sure, factory_sources, not_factory
+from tui.drive.settings.factory import factory_is_sure, factory_raw, factory_sources, not_factory
 from tui.drive.settings.memory_orders import MemoryRefused, factory_order, save_order
 from tui.drive.settings.writable import AT_REST, is_setting, line_setting
 from tui.drive.shown import depends_on
@@ -165,14 +165,21 @@ async def _report(session: DriveSession, retrying: RetryingReader) -> str:
     ]
     sources = [code for p in settings for code in (*factory_sources(p), *depends_on(p))]
     raws = await retrying.ask_many(dict.fromkeys([*(p.code for p in settings), *sources]))
-    held = [p for p in settings if p.code in raws]
+    lacking = retrying.lacking
+    known = [
+        p for p in settings if p.code in raws and factory_raw(profile, p, raws, lacking) is not None
+    ]
     other = [
         p.code if factory_is_sure(p) else f"{p.code} ?"
-        for p in held
-        if not_factory(profile, p, raws, retrying.lacking)
+        for p in known
+        if not_factory(profile, p, raws, lacking)
     ]
-    text = f"{profile.name}: the factory settings are restored in working memory."
-    if not other:
-        return f"{text} Checked {len(held)} settings; all have their factory value."
-    names = first_of(other, SETTINGS_NAMED)
-    return f"{text} {len(other)} of {len(held)} settings have another value: {names}."
+    parts = [f"{profile.name}: the factory settings are restored in working memory."]
+    if other:
+        names = first_of(other, SETTINGS_NAMED)
+        parts.append(f"{len(other)} of {len(known)} settings have another value: {names}.")
+    elif known:
+        parts.append(f"Checked {len(known)} settings; all have their factory value.")
+    if unknown := len(settings) - len(known):
+        parts.append(f"Not checked: {unknown} settings whose value or factory value is not known.")
+    return " ".join(parts)

@@ -128,10 +128,11 @@ class Staging:
         if result.done and edit.old is not None:
             self._before[edit.code] = edit.old
 
-    def drop_written(self) -> list[str]:
-        """Unstage the values that the drive has; return their codes."""
-        done = [result.edit.code for result in self.results.values() if result.done]
-        self.edits = Edits(tuple(edit for edit in self.edits.requested if edit.code not in done))
+    def drop_written(self) -> list[Result]:
+        """Unstage the values that the drive has; return their results."""
+        done = [result for result in self.results.values() if result.done]
+        codes = {result.edit.code for result in done}
+        self.edits = Edits(tuple(edit for edit in self.edits.requested if edit.code not in codes))
         return done
 
     def drop_held(self) -> None:
