@@ -21,6 +21,7 @@ from types import MappingProxyType
 
 from tests.answering import read_answering
 from tests.bus.peer import tcp_request_length
+from tests.limits import BURST_GAP
 from tests.programs import PATIENCE, wait_until
 from tui.simulator import DriveSpec, Simulation
 
@@ -137,11 +138,20 @@ class PtyPanel:
     _rest: str = ""
 
     def type(self, *pieces: bytes | str, apart: float = SPLIT) -> None:
-        """Write to the terminal, each piece separately."""
+        """Write to the terminal, each piece separately, later than a burst after what was seen.
+
+        A fast computer shows the effect of a key within a burst. Nobody answers so fast.
+        """
+        time.sleep(BURST_GAP)
         for index, piece in enumerate(pieces):
             if index:
                 time.sleep(apart)
             os.write(self.terminal, piece.encode() if isinstance(piece, str) else piece)
+
+    def open_search(self) -> None:
+        """Go to the search field of Parameters, and wait until it takes text."""
+        self.type("/")
+        self.shows("/ search", "Enter list")
 
     def look(self, seconds: float = 0.05) -> bool:
         """Read the panel's output; False once it has ended."""

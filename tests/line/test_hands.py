@@ -132,14 +132,22 @@ def test_paste_into_a_field_is_text_and_submits_nothing(fresh_panel: PtyPanel) -
     panel = fresh_panel
     panel.type("3")
     panel.shows("/ search")
-    panel.type("/")
-    panel.settle()
+    panel.open_search()
     panel.type("\x1b[200~acceler r\r\x1b[201~")
     panel.shows("acceler r")
     panel.settle()
     assert panel.log.writes == []
     panel.type("\x7f\x7f")
     panel.shows("acceler ")
+
+
+def test_key_too_close_to_the_one_that_opens_a_screen_is_reported(fresh_panel: PtyPanel) -> None:
+    panel = fresh_panel
+    panel.type("3", "/", "A")
+    panel.shows("Ignored")
+    panel.settle()
+    assert "Enter list" not in panel.text()
+    panel.open_search()
 
 
 @pytest.mark.parametrize("options", [(), ("--mouse",)], ids=["without mouse", "with mouse"])

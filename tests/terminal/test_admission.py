@@ -16,6 +16,7 @@ from textual.widgets import Input, Static
 
 from tests.limits import KEY_TOO_LATE
 from tests.ui.test_flows import until
+from tui.terminal import type_ahead
 from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.stroke import Stroke, attach
 from tui.terminal.type_ahead import TypeAhead
@@ -40,6 +41,9 @@ class Question(ModalScreen[None]):
 
     def compose(self) -> ComposeResult:
         yield Input(id="answer")
+
+    def on_input_submitted(self) -> None:
+        self.dismiss()
 
 
 class Panel(App[None]):
@@ -262,6 +266,31 @@ async def test_keys_typed_ahead_reach_the_dialog() -> None:
         await until(pilot, lambda: isinstance(app.screen, Question))
         answer = app.screen.query_one(Input)
         await until(pilot, lambda: answer.value == "30")
+
+
+async def test_key_after_enter_in_a_dialog_reaches_the_screen_below() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send("f", "3", "enter", "r", "y")
+        await until(pilot, lambda: "yes" in app.done)
+        assert app.done == ["run", "yes"]
+
+
+async def test_key_follows_one_whose_work_takes_too_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A screen that waits for something gets the next key, for example Esc."""
+    monkeypatch.setattr(type_ahead, "WAIT_LONGEST", 0.1)
+    app = Panel()
+    async with app.run_test() as pilot:
+        released = asyncio.Event()
+        app.query_one(Line).call_later(released.wait)
+        app.set_focus(app.query_one(Line))
+        app.send("left", "r")
+        await until(pilot, lambda: app.typed.stroke is None)
+        assert app.query_one(Line).typed == ""
+        released.set()
+        await until(pilot, lambda: app.query_one(Line).typed == "<left>r")
 
 
 @pytest.mark.parametrize(
