@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -16,6 +17,7 @@ from tests.sweeps import kept
 from tui.drive.profile import library
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.command.command_keys import OptionsScreen
+from tui.screens.connection.rows import rows_of
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
@@ -23,9 +25,12 @@ from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import Question, void_questions
+from tui.screens.frame_source import drive_now
 from tui.screens.keys.help import HelpScreen
 from tui.screens.parameters.screen import ParametersScreen
 from tui.screens.parameters.write_keys import RestQuestion
+from tui.screens.state_words import state_words
+from tui.session.fleet import FoundDrive
 from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot
 from tui.widgets.motor_state_text import motor_state_text
@@ -284,20 +289,21 @@ async def test_only_questions_about_the_stopped_drive_end() -> None:
 
 
 def now_text(snapshot: Snapshot | None, look: Look | None = None, passed: float = 0.0) -> str:
-    now = fakes.NOW + passed
-    return motor_state_text(library.load("atv71"), snapshot, 0.5, look, now).plain
+    now, session = fakes.NOW + passed, fakes.console_of(None).session
+    words = partial(state_words, session)
+    return motor_state_text(session.profile, snapshot, 0.5, look, now, words).plain
 
 
 def test_motor_state_is_shown_in_one_line() -> None:
     profile = library.load("atv71")
     running = fakes.snapshot_of(profile, fakes.RUNNING)
-    assert now_text(running).split() == ["▶", "running", "forward", "50.0", "Hz", "8.4", "A"]
-    assert now_text(fakes.snapshot_of(profile, fakes.FAULT)).startswith("■ fault ObF")
+    assert now_text(running).split() == ["▶", "FORWARD", "50.0", "Hz", "8.4", "A"]
+    assert now_text(fakes.snapshot_of(profile, fakes.FAULT)).startswith("■ FAULT ObF")
     place = now_text(running).index("Hz")
     assert now_text(fakes.snapshot_of(profile, fakes.READY)).index("Hz") == place
     # three cycles later it is not the present any more
     assert "▶" in now_text(running, passed=1.3)
-    assert now_text(running, passed=5.0) == "? state unknown   5s ago: running forward"
+    assert now_text(running, passed=5.0) == "? state unknown   5s ago: FORWARD"
     lost = fakes.snapshot_of(profile, fakes.RUNNING, error="No answer.", age=2.0)
     assert now_text(lost).startswith("? state unknown   2s ago")
     unplugged = fakes.snapshot_of(profile, fakes.RUNNING, line=fakes.LOST)
@@ -305,14 +311,37 @@ def test_motor_state_is_shown_in_one_line() -> None:
     assert now_text(None) == "? state unknown"
 
 
+@pytest.mark.parametrize(
+    ("raws", "word"),
+    [
+        ({**fakes.READY, "ETA": 0x0250, **fakes.CHANNELS}, "STANDBY"),
+        ({**fakes.READY, "ETA": 0x0250, **fakes.CHANNELS, "CCC": 1}, "NOT READY"),
+        (fakes.RUNNING, "FORWARD"),
+        (fakes.FAULT, "FAULT ObF"),
+    ],
+)
+def test_question_line_and_status_bar_have_one_word_for_a_state(
+    raws: dict[str, int], word: str
+) -> None:
+    profile = library.load("atv71")
+    console = fakes.console_of(fakes.snapshot_of(profile, raws))
+    fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, console))
+    assert drive_now(console, fleet, fakes.NOW).words == word
+    words = partial(state_words, console.session)
+    question = motor_state_text(profile, console.latest, 0.5, None, fakes.NOW, words).plain
+    assert question[2:].startswith(f"{word} ")
+    row = rows_of(fleet, fakes.NOW, connected=True)[console.device]
+    assert row.words.upper() == word or row.kind == "fault"
+
+
 def test_unmonitored_drive_shows_the_state_of_its_checks() -> None:
     profile = library.load("atv71")
     state = fakes.snapshot_of(profile, fakes.RUNNING).state
     look = Look(state, "", fakes.NOW, None)
-    assert now_text(None, look).strip() == "▶ running forward"
-    assert now_text(None, look, 20.0).startswith("? state unknown   20s ago: running")
+    assert now_text(None, look).strip() == "▶ FORWARD"
+    assert now_text(None, look, 20.0).startswith("? state unknown   20s ago: FORWARD")
     old = fakes.snapshot_of(profile, fakes.READY, age=60)
-    assert now_text(old, look).strip() == "▶ running forward"
+    assert now_text(old, look).strip() == "▶ FORWARD"
 
 
 async def test_open_question_shows_the_motor_state() -> None:
@@ -325,10 +354,10 @@ async def test_open_question_shows_the_motor_state() -> None:
     async with requested.app.run_test(size=(80, 24)) as pilot:
         await requested.put(pilot)
         now = requested.question.query_one("#now")
-        assert "running forward" in str(now.render())
+        assert "FORWARD" in str(now.render())
         stopped = fakes.snapshot_of(profile, fakes.READY)
         cast("Any", console.monitor)._latest = replace(stopped)
-        await until(pilot, lambda: "ready" in str(now.render()))
+        await until(pilot, lambda: "STANDBY" in str(now.render()))
         two = MotorStates(requested.app, [session, session])
         assert [line.split()[:2] for line in two().plain.splitlines()] == [["Now", "2"]] * 2
         six = MotorStates(requested.app, [session] * 6)
@@ -454,7 +483,8 @@ async def test_only_y_writes(name: str) -> None:
             await way(made)
             await until(made.pilot, lambda: isinstance(made.app.screen, kind))
             now = str(made.app.screen.query_one("#now").render())
-            assert any(word in now for word in ("ready", "not known", "stopped", "fault")), now
+            states = ("READY", "STANDBY", "STOPPED", "FAULT", "unknown")
+            assert any(word in now for word in states), now
             await made.pilot.press(key)
             await made.pilot.pause(0.3)
             assert isinstance(made.app.screen, kind) is (key == "enter")
@@ -502,7 +532,7 @@ async def test_panel_does_not_exit_during_a_question() -> None:
 @pytest.mark.parametrize("size", [(80, 24), (120, 40)])
 async def test_keys_of_leaving_are_always_at_the_bottom(size: tuple[int, int], motors: int) -> None:
     def runs() -> Text:
-        return Text("\n".join(["Now  running forward"] * motors))
+        return Text("\n".join(["Now  ▶ FORWARD"] * motors))
 
     reported = "\n".join(
         f"Device {n}: on loss of communication it acts 3 s after." for n in range(40)

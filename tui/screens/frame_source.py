@@ -17,6 +17,7 @@ from tui.widgets.strip import BarMessage, DriveNow, FrameView, StripView
 
 from .frame import at, with_drive
 from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
+from .state_words import state_cell, value_cell
 
 if TYPE_CHECKING:
     from tui.session.command.stop_report import StopReport
@@ -72,10 +73,6 @@ def repeats(message: str, texts: Iterable[str]) -> bool:
 
 LOAD_OVER = 2.0
 """Seconds over which the load of the line is measured."""
-STOP_SHOWN = 10.0
-"""Seconds for which a failed stop replaces the state, even if the state is known."""
-STOP_WORDS = {"sending": "STOP WAITS", "stopping": "STOPPING"}
-"""Texts of a stop in progress: its frame waits for the line, or was sent."""
 NO_ANSWER_YET = (
     "Drive {device}: NO ANSWER for {silent:.1f} s. Its communication timeout ends in {left:.1f} s:"
     " {does}."
@@ -84,7 +81,6 @@ NO_ANSWER_OVERDUE = (
     "Drive {device}: NO ANSWER for {silent:.1f} s. Its communication timeout has ended: {does}."
 )
 UNKNOWN_REACTION = "its reaction is not known"
-DIRECTION_WORDS = {"forward": "FORWARD", "reverse": "REVERSE"}
 
 
 class FrameSource:
@@ -244,9 +240,9 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
     report = fleet.stopper.reports.get(session.device)
     by_look = snapshot is None or (look is not None and look.time > snapshot.time)
     state, age, readings = _seen(console, look if by_look else None, now)
-    kind, words = state_cell(console, state, report, now, readings)
+    kind, words = state_cell(session, state, report, now, readings)
     values = {
-        quantity: value_cell(console, readings, quantity)
+        quantity: value_cell(session, readings, quantity)
         for quantity in ("output_frequency", "frequency_reference", "motor_current")
     }
     armed = console.commander.armed_for
@@ -287,70 +283,6 @@ def _seen(
     age = max(0.0, now - snapshot.time)
     lost = bool(snapshot.error) or snapshot.is_stale(now)
     return snapshot.state, age if lost else None, snapshot.readings
-
-
-def state_cell(
-    console: DriveConsole,
-    state: DriveState | None,
-    report: StopReport | None,
-    now: float,
-    readings: Mapping[str, Shown],
-) -> tuple[str, str]:
-    """Kind and text of the state; a stop in progress takes precedence."""
-    if report is not None:
-        if report.phase.value in STOP_WORDS:
-            return "stop", STOP_WORDS[report.phase.value]
-        shown = report.phase.value == "unheeded" or now - report.since < STOP_SHOWN
-        if report.phase.value in ("unheeded", "failed") and shown:
-            return "stop failed", "NOT STOPPED"
-    if state is None:
-        return "", "reading"
-    if state.kind == "running":
-        return state.kind, DIRECTION_WORDS.get(state.direction or "", "RUNNING")
-    if state.kind == "fault":
-        return state.kind, f"FAULT {state.fault.code}" if state.fault else "FAULT"
-    if stands_by(console, state):
-        return "ready", "STANDBY"
-    if state.kind == "stopping" and _is_at_zero(console, readings):
-        return "stopped", "STOPPED"  # some drives keep the quick stop state at standstill
-    return state.kind, state.headline.upper() or "UNKNOWN"
-
-
-def _is_at_zero(console: DriveConsole, readings: Mapping[str, Shown]) -> bool:
-    parameter = console.session.profile.quantity("output_frequency")
-    reading = readings.get(parameter.code) if parameter else None
-    return reading is not None and reading.current_number == 0
-
-
-def stands_by(console: DriveConsole, state: DriveState) -> bool:
-    """Return True if the motor is at standstill and the next command of this panel runs it."""
-    if state.kind not in ("blocked", "ready", "stopped"):
-        return False
-    from tui.drive.orders import chart_in_force
-
-    from .command.control import hindrance
-
-    profile, raws = console.session.profile, console.session.image.raws
-    return chart_in_force(profile, raws) is not None and hindrance(profile, raws) is None
-
-
-def value_cell(
-    console: DriveConsole, readings: Mapping[str, Shown], quantity: str
-) -> tuple[str, str]:
-    """Text and unit of a quantity; empty if it was not read."""
-    parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
-    reading = readings.get(parameter.code) if parameter else None
-    if parameter is None or reading is None:
-        return "", ""
-    from tui.drive.values import NOT_AVAILABLE  # the first picture needs none of it
-
-    # the row, or the bar, shows one age for all its values
-    return reading.drawn(
-        reading.time,
-        current=lambda value: (value.text, value.unit),
-        old=lambda value, age: (value.text, value.unit),
-        missing=(NOT_AVAILABLE, parameter.unit),
-    )
 
 
 def _commanding(fleet: Fleet, device: int) -> str:

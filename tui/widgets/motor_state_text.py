@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 from rich.text import Text
 
 from tui.bus.api import LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
+from tui.session.drive_state import DriveState
 from tui.session.monitor.line_watch import GLANCE
 from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot, stale_after
+from tui.session.shown import Shown
 
 from .palette import ALARM, FAINT, PLAIN, STALE, STATE_SIGNS, STATE_STYLES, STRONG, age_text
 
@@ -21,8 +25,17 @@ HEADLINE_WIDTH = 18
 """Columns of the state's words, so that the numbers after them do not move."""
 
 
+StateWords = Callable[[DriveState, Mapping[str, Shown]], tuple[str, str]]
+"""Returns the kind of a state and its words, from the state and the values read with it."""
+
+
 def motor_state_text(
-    profile: Profile, snapshot: Snapshot | None, period: float, look: Look | None, now: float
+    profile: Profile,
+    snapshot: Snapshot | None,
+    period: float,
+    look: Look | None,
+    now: float,
+    words: StateWords,
 ) -> Text:
     """State, frequency and current of the last cycle, or the state that the line watch read.
 
@@ -30,13 +43,13 @@ def motor_state_text(
     three cycles, or with an error, is shown as unknown, with its age.
     """
     if snapshot is None or (look is not None and look.time > snapshot.time):
-        return _by_look(look, now)
+        return _by_look(look, now, words)
     age = max(0.0, now - snapshot.time)
     cycle = max(period, 1 / snapshot.rate if snapshot.rate else period)
     heard = not snapshot.error and snapshot.line.status is LineStatus.CONNECTED
     if not heard or age > stale_after(cycle) or snapshot.state.kind == "unknown":
-        return _not_known(snapshot.state.headline, age)
-    text = _state(snapshot.state.headline, snapshot.state.kind)
+        return _not_known(words(snapshot.state, snapshot.readings)[1], age)
+    text = _state(*words(snapshot.state, snapshot.readings))
     for quantity in QUANTITIES_NOW:
         parameter = profile.quantity(quantity)
         reading = snapshot.readings.get(parameter.code) if parameter else None
@@ -55,17 +68,17 @@ def motor_state_text(
     return text
 
 
-def _by_look(look: Look | None, now: float) -> Text:
+def _by_look(look: Look | None, now: float, words: StateWords) -> Text:
     """Return the state from the line watch, which reads no values."""
     if look is None or look.state is None:
         return _not_known("", None)
     age = max(0.0, now - look.time)
     if look.error or age > stale_after(GLANCE) or look.state.kind == "unknown":
-        return _not_known(look.state.headline, age)
-    return _state(look.state.headline, look.state.kind)
+        return _not_known(words(look.state, look.readings)[1], age)
+    return _state(*words(look.state, look.readings))
 
 
-def _state(headline: str, kind: str) -> Text:
+def _state(kind: str, headline: str) -> Text:
     style = PLAIN if kind == "fault" else STATE_STYLES.get(kind, PLAIN)
     sign = STATE_SIGNS.get(kind, "□")
     text = Text(no_wrap=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from ..frame_source import state_cell, value_cell
+from ..state_words import state_cell, value_cell
 from .found import profile_text
 from .wall import WallRow
 
@@ -51,7 +51,7 @@ def _row(
         return WallRow(identity.device, who, identity.name, words="no profile")
     state, readings, age, old, contact = _seen(console, look, *at)
     report = fleet.stopper.reports.get(identity.device)
-    kind, words = state_cell(console, state, report, at[0], readings)
+    kind, words = state_cell(console.session, state, report, at[0], readings)
     if kind not in ("stop", "stop failed"):
         words = _called(state, words)
     if kind == "running" and fleet.left_behind(console):
@@ -108,7 +108,7 @@ def _figure(console: DriveConsole, readings: Mapping[str, Shown], quantity: str)
     """Return text and unit of a value; `?` marks a parameter not verified for this family."""
     from tui.drive.profile.profile import is_verified  # imported late: speeds up the start
 
-    text, unit = value_cell(console, readings, quantity)
+    text, unit = value_cell(console.session, readings, quantity)
     parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
     sign = "?" if text and parameter is not None and not is_verified(parameter) else ""
     return text + sign, unit

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from rich.text import Text
 
 from tui.widgets.palette import FAINT
+
+from ..state_words import state_words
 
 if TYPE_CHECKING:
     from tui.screens.app_port import Panel
@@ -44,7 +47,9 @@ class MotorStates:
             look = looks.get(session.device)
             latest = console.latest if console else None
             period = console.monitor.period if console else 0.0
-            text.append_text(motor_state_text(session.profile, latest, period, look, now))
+            words = partial(state_words, session)
+            profile = session.profile
+            text.append_text(motor_state_text(profile, latest, period, look, now, words))
         if (more := len(self._sessions) - DRIVES_NAMED) > 0:
             text.append(f"\nand {more} more", FAINT)
         return text

@@ -24,9 +24,9 @@ from tui.widgets.strip import FrameView
 
 from ..command.control import Control
 from ..frame import SELDOM
-from ..frame_source import stands_by
 from ..keys.action import MONITOR
 from ..keys.table import bindings, keys_line
+from ..state_words import stands_by
 from .arrange import READOUT_ROWS, WIDE, Arrangement, arrange
 from .assembly import codes_beside, curve_or_table, monitor_parts, tables, watched_words
 from .motor import other_values
@@ -306,7 +306,7 @@ class ViewSource:
             apart=app.clock.wall_of(0.0),
             page=cursor.page,
             cursor=cursor.moment,
-            stands_by=snapshot is not None and stands_by(console, snapshot.state),
+            stands_by=snapshot is not None and stands_by(console.session, snapshot.state),
             fault_at=self._fault_at(),
             word=word,
         )
