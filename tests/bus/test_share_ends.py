@@ -567,6 +567,23 @@ async def test_keeper_is_not_started_once_its_program_holds_the_line(
         other.give_back()
 
 
+@pytest.mark.internal_errors
+async def test_error_in_sending_the_state_does_not_end_the_line(
+    share: Share, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fails(_sharing: Sharing) -> None:
+        raise ValueError("on purpose")
+
+    monkeypatch.setattr(Sharing, "tell_state", fails)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        line = Line(lines.link, timing=QUICK, place=place_in(lines.folder), share=Sharing)
+        lines.opened.append(line)
+        line.open(wait=5.0)
+        assert (await line.read(1, 100)).words == (100,)
+    assert "was not sent to the programs" in caplog.text
+
+
 def test_disk_has_at_most_2_s() -> None:
     assert DISK_WITHIN <= 2.0
 

@@ -185,6 +185,25 @@ def test_own_messages_are_not_repeated() -> None:
     assert found(holder, log, "panel") == []
 
 
+def test_message_with_a_file_name_that_is_not_utf_8_is_sent() -> None:
+    holder, log = LineHolder(), EventLog()
+    left(holder, "panel", Event(1.0, 2, "done", "Saved: bundle\udcff.zip"))
+    assert [event.text for event in found(holder, log)] == [
+        f"Saved: bundle?.zip ({holder.program('panel').me.text})"
+    ]
+
+
+@pytest.mark.internal_errors
+def test_message_that_cannot_be_sent_is_kept() -> None:
+    def fails(_event: Event) -> None:
+        raise ValueError("on purpose")
+
+    log = EventLog(lambda: 50.0)
+    log.left = fails
+    assert log.add("stop", "Stopped.", 2) == Event(50.0, 2, "stop", "Stopped.")
+    assert [event.text for event in log.events] == ["Stopped."]
+
+
 def test_message_does_not_control_terminal() -> None:
     holder, log = LineHolder(), EventLog()
     data = msgspec.msgpack.encode(LeftEvent("run", Event(1.0, 2, "told", "\x1b[2J")))

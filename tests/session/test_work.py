@@ -359,6 +359,21 @@ async def test_unforeseen_error_clears_the_queue(reported: Notified) -> None:
     assert (await reported.idle())[3:] == ["c begun", "c done"]
 
 
+@pytest.mark.internal_errors
+async def test_error_in_passing_on_a_result_changes_no_result(
+    reported: Notified, caplog: pytest.LogCaptureFixture
+) -> None:
+    def fails(_outcome: object) -> None:
+        raise ValueError("on purpose")
+
+    reported.queue.on_report = fails
+    reported.put("a")
+    reported.put("b")
+    assert await reported.idle() == ["a begun", "a done", "b begun", "b done"]
+    assert reported.outcome() == (OutcomeKind.DONE, "b is done")
+    assert "was not passed on" in caplog.text
+
+
 async def test_cancelled_task_reports_what_was_done(reported: Notified) -> None:
     reported.put("a", error=OrderRefused("No."), left="2 written, 6 still staged.")
     await reported.idle()

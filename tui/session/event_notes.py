@@ -39,7 +39,8 @@ class EventNotes:
         self._facts.notes.ask(0, EVENTS_OF_LINE)
 
     def _leave(self, event: Event) -> None:
-        left = LeftEvent(self._facts.me.text, event._replace(text=event.text[:MOST_CHARACTERS]))
+        text = readable(event.text, MOST_CHARACTERS)  # a file's name may have no UTF-8 form
+        left = LeftEvent(self._facts.me.text, event._replace(text=text))
         self._facts.notes.leave(LineNote(0, EVENTS_OF_LINE, msgspec.msgpack.encode(left)))
 
     def _hear(self, event: LineEvent) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections import deque
 from collections.abc import Callable
 from threading import Lock
 from typing import NamedTuple
+
+log = logging.getLogger(__name__)
 
 EVENTS_KEPT = 500
 
@@ -43,7 +46,11 @@ class EventLog:
             at = self._wall() if wall is None else wall
             self._newest = new = Event(at, device, kind, text)
             self._events.append(new)
-        self.left(new)
+        try:
+            self.left(new)
+        except Exception:
+            # the message itself is kept: what it reports goes on
+            log.exception("a message was not sent to the other programs")
         return new
 
     def join(self, event: Event) -> None:

@@ -127,7 +127,11 @@ class WorkQueue:
     def report(self, kind: OutcomeKind, text: str, error: Exception | None = None) -> None:
         """Report the result of work on the drive."""
         self.outcome = outcome = Outcome(kind, text, self._clock.monotonic(), error)
-        self.on_report(outcome)
+        try:
+            self.on_report(outcome)
+        except Exception:
+            # it must not turn the result of work into a failure, or keep a stop from its report
+            log.exception("a result of work on device %s was not passed on", self._device)
 
     # Work
 

@@ -227,12 +227,12 @@ class Engine:
             self._error = error
             self._news.notify_all()
         if self._shared is not None:
-            self._shared.tell_state()
-        try:
-            self.facts.events.emit(StateChanged(state))
-        except Exception:
-            # an error there must not end the loop of the line: a stop may wait for it
-            log.exception("a change of the line was not passed on")
+            try:
+                self._shared.tell_state()
+            except Exception:
+                # it must not end the loop of the line: a stop may wait for it
+                log.exception("the line's state was not sent to the programs on it")
+        self.facts.events.emit(StateChanged(state))
 
     def _work(self, loop: asyncio.AbstractEventLoop) -> None:
         """The thread: run the loop until closed, then leave nothing behind."""
