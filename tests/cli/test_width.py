@@ -19,7 +19,7 @@ from tui.session.reading import Reading
 from tui.session.shown import Quality
 
 ATV71 = library.load("atv71")
-LONG = "10 s, then: Fault SLF1, the motor coasts; as it leaves the factory."
+LONG = "10 s. Fault SLF1, the motor coasts; as it leaves the factory."
 
 
 class Terminal(io.StringIO):

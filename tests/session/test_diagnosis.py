@@ -315,8 +315,8 @@ async def test_bytes_at_another_baud_show_which(baud: int, line: OpenedLine) -> 
     with PtyPeer(at(baud, "8E1")) as peer:
         found = await why(line(peer.path))
     assert found.rung == "wrong-settings"
-    assert f"at {baud} bit/s most likely" in found.text
-    assert ("slower" in found.text) is (baud < 19200)
+    assert f"probably at {baud} bit/s" in found.text
+    assert ("more slowly" in found.text) is (baud < 19200)
     assert any(f",{baud},8E1." in step for step in found.steps)
 
 

@@ -374,7 +374,7 @@ PARTS = [
     Part(
         "App._set_pointer_shape",
         "driver.py",
-        "NEVER_SENT: what Textual sends to give the mouse another shape",
+        "DROPPED_SEQUENCES: what Textual sends to give the mouse another shape",
         _pointer_shape,
     ),
     Part(

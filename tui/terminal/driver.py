@@ -98,7 +98,7 @@ ASK_FOR_FOCUS = "\x1b[?1004h"
 NO_REPORTS = "\x1b[?1000l\x1b[?1002l\x1b[?1003l\x1b[?1006l\x1b[?1004l"
 """Ends mouse reports that a crashed program left on: a click would type keys, even a Space."""
 
-NEVER_SENT = ("\x1b[>", "\x1b[<u", "\x1b]22;")
+DROPPED_SEQUENCES = ("\x1b[>", "\x1b[<u", "\x1b]22;")
 """Sequences of Textual that are dropped: for the kitty keyboard protocol and the mouse pointer."""
 
 
@@ -183,7 +183,7 @@ def _quiet(driver: type[Driver]) -> type[Driver]:
             super().__init__(app, mouse=self.wanted, **settings)
 
         def write(self, data: str) -> None:
-            if not self.wanted and data.startswith(NEVER_SENT):
+            if not self.wanted and data.startswith(DROPPED_SEQUENCES):
                 return
             super().write(NO_REPORTS if data == ASK_FOR_FOCUS and not self.wanted else data)
 

@@ -291,7 +291,7 @@ async def plans_of(
         found = await mapper.slots(block)
         plan = assignment(block, found)
         if plan is None:
-            raise MappingError(f"Not every slot of the block {block.name} could be read.")
+            raise MappingError(f"Not every slot of {block.name} could be read.")
         held |= plan.slots
         if wanted.action == "factory":
             plan = factory(profile, block)

@@ -171,6 +171,7 @@ async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
 async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish) -> int:
     """Stop a drive, report the result; returns the exit status."""
     from tui.drive.orders import INSTEAD
+    from tui.session.command.motor_stop import with_other_way
     from tui.session.command.stop_report import Phase
 
     session, order, telling = found.session, wish.order, wish.telling
@@ -184,10 +185,7 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
     if telling.as_json:
         await PolledDrive(session, "", goes_on=True).learn()
     if report.phase is Phase.STOPPED:
-        text = f"{who}: {report.text}."
-        if way != order:
-            text = f"{who}: {report.text} (it has no {order}: ramp stop)."
-        telling.stopped(session, text)
+        telling.stopped(session, f"{who}: {with_other_way(report.text, order, way)}.")
         await asyncio.to_thread(forget_start, session)
         return 0
     status = await _why(session)

@@ -330,7 +330,7 @@ def watch_text(watch: TimeoutWatch | None) -> str:
     if watch.reaction is not None and not watch.acts:
         return f"off ({watch.reaction.name}): it goes on without communication"
     reaction = sentence(watch.reaction.does) if watch.reaction else "Its own reaction follows."
-    text = f"{watch.timeout:g} s, then: {reaction}"
+    text = f"{watch.timeout:g} s. {reaction}"
     return text if watch.active else f"{text} It begins with the first command or reference."
 
 

@@ -43,7 +43,7 @@ def seconds(shortest: float = 0.0, *, above: bool = False) -> FiniteRange:
 _TOO_SHORT = (
     "--every {every:g} is too short: at {baud} baud, reading one word from one drive takes"
     " {needed:.2g} s. Use a longer cycle.",
-    "--every {every:g} is too short: at {baud} baud, reading one word from {count} drives take"
+    "--every {every:g} is too short: at {baud} baud, reading one word from {count} drives takes"
     " {needed:.2g} s. Use a longer cycle.",
 )
 

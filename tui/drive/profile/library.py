@@ -48,7 +48,8 @@ def packaged_folder() -> Path:
 def user_folder() -> Path:
     """Return the folder of the user's own profiles, in the configuration folder.
 
-    `DRIVEPANEL_CONFIG` names another configuration folder. None if the user has no home folder.
+    `DRIVEPANEL_CONFIG` names another configuration folder. If the user has no home folder, the
+    returned path does not exist.
     """
     if configured := os.environ.get("DRIVEPANEL_CONFIG"):
         return Path(configured) / "profiles"

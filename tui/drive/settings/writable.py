@@ -119,7 +119,8 @@ _NOT_AT_REST = (
     "{code} can be written only with the motor stopped; the drive is now {state}. Stop it first."
 )
 _STATE_NOT_KNOWN = (
-    "{code} can be written only with the motor stopped; its state is unknown. Stop it first."
+    "{code} can be written only with the motor stopped; the drive's state is unknown."
+    " Stop it first."
 )
 
 _STORAGE = {

@@ -172,7 +172,7 @@ async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> 
 
 async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord) -> SentFirst:
     """Write the word once, and record it in the journal whatever the result."""
-    answer = reported = "a signal came: not known whether it was taken"
+    answer = reported = "interrupted by a signal: it is not known if the drive received it"
     try:
         await line.write(device, what.address, [what.word], priority=Priority.STOP)
         answer = reported = "ok"
@@ -181,7 +181,7 @@ async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord
     except ExchangeError as error:
         answer, reported = (
             str(error),
-            "no answer" if isinstance(error, NoAnswer) else "no good answer",
+            "no answer" if isinstance(error, NoAnswer) else "no valid answer",
         )
     except LineError as error:
         answer = reported = str(error)

@@ -16,7 +16,7 @@ COMMANDED_BY_WORD = (
     "its command source is {source} ({code}), not Modbus. Stop it there or at the machine."
 )
 COMMANDED_LOCALLY = (
-    "run by its terminals or keypad, not by Modbus. Stop it there or at the machine."
+    "its terminals or keypad run the motor, not Modbus. Stop it there or at the machine."
 )
 
 

@@ -47,7 +47,6 @@ STANDSTILL_POLL_INTERVAL = 0.15
 SILENT_WAIT = 0.1
 """Seconds that a drive which was silent before has to answer the first of several stops."""
 
-OTHER_WAY = "{progress} (it has no {wanted}: {way})"
 STILL_ENABLED = {
     "local": "it is at 0 Hz and still enabled from its terminals or keypad: a reference turns it at"
     " once.",
@@ -60,6 +59,13 @@ RUNS_ON = {
     "unknown": "it answers and runs on; it is commanded by another source.",
 }
 """Why a motor does not stop, by the source of its commands."""
+
+
+def with_other_way(progress: str, wanted: OrderId, order: OrderId) -> str:
+    """Return a progress with the kind of stop that was requested, if the drive lacks it."""
+    if order == wanted:
+        return progress
+    return f"{progress} (it has no {_way(wanted)}: {_way(order)})"
 
 
 def _way(order: OrderId) -> str:
@@ -285,10 +291,7 @@ class MotorStop:
             self.say(session, Phase.STOPPED, self._with_way("stopped"), self.ordered)
 
     def _with_way(self, progress: str) -> str:
-        """Return a progress with the way to stop that the drive lacks, if it has another one."""
-        if self.order == self.wanted:
-            return progress
-        return OTHER_WAY.format(progress=progress, wanted=_way(self.wanted), way=_way(self.order))
+        return with_other_way(progress, self.wanted, self.order)
 
     def _why_not(self, hertz: float | None) -> str:
         """Return why a drive that does not obey is still enabled."""

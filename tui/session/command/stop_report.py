@@ -15,13 +15,6 @@ NOT_PROVED = (
 """Text for a drive whose family is neither named nor identified; `{}` is what was read."""
 
 
-MESSAGES = {
-    "stopping": "Stopping: {text}",
-    "stopped": "The motor is {text}.",
-}
-"""Messages by phase. The text of other phases is a message as it is."""
-
-
 def not_stopped(why: str) -> str:
     """Return the text for a motor that does not stop: why, and what to do."""
     where = "" if why.endswith("at the machine.") else f" {AT_THE_MACHINE}"
@@ -52,9 +45,16 @@ OVER = frozenset({Phase.STOPPED, Phase.FAILED})
 """Phases in which a stop has ended."""
 
 
+_MESSAGES = {
+    Phase.STOPPING: "Stopping: {text}",
+    Phase.STOPPED: "The motor is {text}.",
+}
+"""Messages by phase. The text of other phases is a message as it is."""
+
+
 def message_text(phase: Phase, text: str) -> str:
     """Return the text of a report as a message that is understood without its phase."""
-    return MESSAGES.get(phase, "{text}").format(text=text)
+    return _MESSAGES.get(phase, "{text}").format(text=text)
 
 
 class StopReport(NamedTuple):

@@ -76,9 +76,9 @@ def settings_hints(sight: DiagnosticEvidence) -> Iterator[str]:
     if not isinstance(link, SerialLink):
         yield f"The gateway sets baud and format. {leaves}"
     elif as_factory(sight):
-        yield f"Baud and format: {leaves} So does this line."
+        yield f"{leaves} This line has the same baud and format."
     else:
-        yield f"Baud and format: {leaves} This line has {link.baud} {link.format}."
+        yield f"{leaves} This line has {link.baud} {link.format}."
     for setting in known.settings:
         if setting.role == "format" and len(setting.choices) == 1:
             port = setting.note.rstrip(".") or setting.parameter

@@ -14,15 +14,11 @@ SAME_SPEED = 1.3
 """Greatest ratio of received to due bytes that still indicates the same speed."""
 
 
-_SAME_SPEED = "{came} bytes came where {due} were due: the speed is right, the format hardly"
-_SLOWER = "{came} bytes came where {due} were due: the drive sends slower"
-_SLOWER_AT = (
-    "{came} bytes came where {due} were due: the drive sends slower, at {baud} bit/s most likely"
-)
-_FASTER = "{came} bytes came where {due} were due: the drive sends faster"
-_FASTER_AT = (
-    "{came} bytes came where {due} were due: the drive sends faster, at {baud} bit/s most likely"
-)
+_SAME_SPEED = "the speed is right, but the format is probably wrong"
+_SLOWER = "the drive sends more slowly"
+_SLOWER_AT = "the drive sends more slowly, probably at {baud} bit/s"
+_FASTER = "the drive sends faster"
+_FASTER_AT = "the drive sends faster, probably at {baud} bit/s"
 
 
 def speed_text(sight: DiagnosticEvidence) -> str:
@@ -38,7 +34,7 @@ def speed_text(sight: DiagnosticEvidence) -> str:
         text = _SLOWER_AT if likely else _SLOWER
     else:
         text = _FASTER_AT if likely else _FASTER
-    return text.format(came=came, due=due, baud=likely)
+    return f"{came} bytes arrived instead of {due}, so {text.format(baud=likely)}"
 
 
 def same_speed(sight: DiagnosticEvidence) -> bool:

@@ -12,6 +12,7 @@ from tui.bus.errors import DeviceException, LineError, RequestRefused, Supersede
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
+from tui.drive.sentences import sentence
 from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, is_field, to_words, word_count
 
@@ -230,11 +231,10 @@ def device_refusal(
             f"The drive refused {parameter.code} with exception {error.code}, which no document of"
             f" this family explains. The drive is {headline}."
         )
-    meaning = _sentence(known.meaning)
-    next_step = _sentence(known.remedy)
-    text = f"The drive refused {parameter.code} with exception {known.code}, {known.name}."
-    return f"{text} {meaning} The drive is {headline}. {next_step}".strip()
-
-
-def _sentence(text: str) -> str:
-    return text if not text or text.endswith(".") else f"{text}."
+    parts = (
+        f"The drive refused {parameter.code} with exception {known.code}, {known.name}.",
+        sentence(known.meaning) if known.meaning else "",
+        f"The drive is {headline}.",
+        sentence(known.remedy) if known.remedy else "",
+    )
+    return " ".join(filter(None, parts))
