@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from tui.cli.shared.output import json_text
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession
+from tui.session.shown import Quality
 
 from ..drive.test_fault_help import own_drive
 from .commands import refused, run
@@ -74,7 +76,17 @@ async def test_fault_has_causes_checks_and_live_values() -> None:
         " runs only on a new run command. No input is closed at the terminals now.",
     }
     text = text_of(status)
+    assert reported["supported"] == [
+        {
+            "text": "The braking is too sudden for the inertia",
+            "code": "DEC",
+            "reason": "DEC 0.5 s (up to 1 s)",
+            "source": "general drive knowledge",
+            "confidence": "practice",
+        }
+    ]
     for part in (
+        "supported: The braking is too sudden for the inertia: DEC 0.5 s (up to 1 s)",
         "probably: The braking is too sudden for the inertia; ",
         "(public guide)",
         "check: Increase DEC; ",
@@ -83,6 +95,29 @@ async def test_fault_has_causes_checks_and_live_values() -> None:
         "reset: a fault reset works now, as the drive reports. ",
     ):
         assert part in text
+
+
+async def test_causes_are_in_the_weighed_order() -> None:
+    async with line("atv71") as opened:
+        assert opened.simulation is not None
+        drive = opened.simulation.drive(1)
+        for code, raw in {"ITH": 60, "NCR": 80, "THT": 2}.items():
+            drive.set(code, raw)
+        provoke(opened, "OLF")
+        status = await status_of(opened, "atv71")
+    reported = reported_of(status)["fault"]
+    assert reported["causes"][0] == "ITH is below the motor nameplate current"
+    excluded = {row["text"]: row["reason"] for row in reported["ruled_out"]}
+    assert excluded["Self-cooled motor running slowly"] == "ruled out, THT Force-cooled motor"
+    assert status.finding is not None
+    failed = {
+        code: replace(reading, quality=Quality.STALE)
+        for code, reading in status.finding.readings.items()
+    }
+    old = replace(status.finding, readings=failed).advice
+    assert old is not None
+    assert (old.excluded, old.supported) == ((), ())
+    assert {cause.verdict for cause in old.causes} == {"open"}
 
 
 async def test_drive_reports_that_the_cause_is_still_present() -> None:

@@ -7,10 +7,18 @@ from dataclasses import dataclass
 
 from tui.drive.sentences import sentence
 
+from .causes import (
+    KnownValues,
+    WeighedCause,
+    exclusion,
+    stored_codes,
+    values_at_trip,
+    values_now,
+    weigh,
+)
 from .profile.profile import Profile
-from .profile.schema import FaultHelp, HelpConfidence, Hint, ResetWay
+from .profile.schema import AlarmHelp, FaultHelp, HelpConfidence, Hint, ResetWay
 from .reset_text import MAY_START
-from .shown import shown
 from .values import set_bits
 
 TRUST: Mapping[HelpConfidence, str] = {
@@ -31,25 +39,50 @@ RESET_NOT_YET = "Not yet: the drive reports that the cause is still present."
 
 
 @dataclass(frozen=True, slots=True)
-class ExcludedAdvice:
-    """A cause or check that a value excludes, with that value as text."""
+class DecidedAdvice:
+    """A cause or check for which a value decided, with that value as text."""
 
     text: str
     code: str
     reason: str
-    """Return `ruled out, BRA Yes`, or `not now, ULN 228.0 V` if the value at the fault is
-    unknown."""
+    """`ruled out, BRA Yes`, or `not now, ULN 228.0 V` if the value at the fault is unknown; of a
+    supported cause the values alone."""
+    source: str = ""
+    confidence: HelpConfidence = "practice"
 
 
 @dataclass(frozen=True, slots=True)
 class FaultAdvice:
-    """The causes and checks of a fault that its values do not exclude."""
+    """The causes and checks of a fault, weighed by its values."""
 
-    probable: tuple[str, ...]
+    causes: tuple[WeighedCause, ...]
+    """All causes, the likeliest first, those that a value excludes last."""
     check: tuple[str, ...]
-    excluded: tuple[ExcludedAdvice, ...]
+    """Checks that no value excludes."""
+    excluded: tuple[DecidedAdvice, ...]
+    """Excluded causes, then excluded checks."""
     confidence: HelpConfidence
     """The confidence of the first remaining cause: practice, unless the help lists it first."""
+
+    @property
+    def probable(self) -> tuple[str, ...]:
+        """Causes that no value excludes, the likeliest first."""
+        return tuple(cause.text for cause in self.causes if cause.verdict != "excluded")
+
+    @property
+    def supported(self) -> tuple[DecidedAdvice, ...]:
+        """Causes that values support, with these."""
+        return tuple(
+            DecidedAdvice(
+                cause.text,
+                cause.evidence[0].code,
+                "; ".join(evidence.text for evidence in cause.evidence),
+                cause.evidence[0].rule.source,
+                cause.evidence[0].rule.confidence,
+            )
+            for cause in self.causes
+            if cause.verdict == "supported"
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,39 +121,50 @@ def reset_ready(profile: Profile, raws: Mapping[str, int]) -> bool | None:
 
 
 def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
-    """Return the codes to read to display a fault."""
+    """Return the codes to read to display a fault and to weigh its causes."""
     reported = profile.data.faults.reset_ready
     codes = [look.code for look in hint.look_at] if hint else []
-    for row in hint.ruled_out if hint else ():
-        codes += [row.parameter, *(when.parameter for when in row.when)]
+    for rule in (*hint.ruled_out, *hint.supported) if hint else ():
+        codes += rule.codes
+    codes = [*codes, *stored_codes(profile, codes)]
+    known = [parameter for code in codes if (parameter := profile.get(code)) is not None]
+    codes += [p.scale_by.parameter for p in known if p.scale_by]
+    codes += [p.unit_by.parameter for p in known if p.unit_by]
     return list(dict.fromkeys([*codes, *([reported.parameter] if reported else [])]))
 
 
-def advice(profile: Profile, hint: Hint, raws: Mapping[str, int], *, latest: bool) -> FaultAdvice:
-    """Return the causes and checks of a fault or an alarm, without those that values exclude.
+def advice_now(
+    profile: Profile, hint: Hint, raws: Mapping[str, int], *, present: bool, latest: bool = True
+) -> FaultAdvice:
+    """Weigh by current values and by those that the drive stored at its last trip.
 
-    `latest` is False for a fault that is not the last one: the values that the drive has stored do
-    not belong to it.
+    `present` is False if the drive is no longer in the fault, `latest` if its last fault is another
+    one. For an alarm, which is there now, all values are those of its time.
     """
-    stored = frozenset(profile.data.faults.stored[0]) if profile.data.faults.stored else frozenset()
-    known = raws if latest else {code: raw for code, raw in raws.items() if code not in stored}
-    rows = {row.text: row for row in reversed(hint.ruled_out) if row.holds(known)}
-    probable = tuple(text for text in hint.probable if text not in rows)
-    excluded = []
-    for text in (*hint.probable, *hint.check):
-        if (row := rows.get(text)) is not None:
-            parameter = profile[row.parameter]
-            value = shown(profile, parameter, known[row.parameter], known)
-            measured = parameter.access == "r" and bool(parameter.unit)
-            reason = f"ruled out, {row.parameter} {value.text} {value.unit}".rstrip()
-            if measured and row.parameter not in stored:
-                reason = f"not now, {row.parameter} {value.text} {value.unit}".rstrip()
-            excluded.append(ExcludedAdvice(text, row.parameter, reason))
+    alarm = isinstance(hint, AlarmHelp)
+    trip = values_at_trip(profile, raws, 0 if latest and not alarm else None, present=present)
+    now = values_now(profile, raws)
+    return advice(profile, hint, KnownValues(now, {**now, **trip} if alarm else trip))
+
+
+def advice(profile: Profile, hint: Hint, known: KnownValues) -> FaultAdvice:
+    """Weigh the causes of a fault or an alarm, and leave out the checks that values exclude."""
+    causes = weigh(profile, hint, known)
+    decided = {cause.text: cause.evidence[0] for cause in causes if cause.verdict == "excluded"}
+    for text in hint.check:
+        if (found := exclusion(profile, hint, text, known)) is not None:
+            decided[text] = found
+    excluded = tuple(
+        DecidedAdvice(text, found.code, found.reason, found.rule.source, found.rule.confidence)
+        for text in dict.fromkeys((*hint.probable, *hint.check))
+        if (found := decided.get(text)) is not None
+    )
+    first = next((cause.text for cause in causes if cause.verdict != "excluded"), None)
     return FaultAdvice(
-        probable,
-        tuple(text for text in hint.check if text not in rows),
-        tuple(excluded),
-        hint.confidence if probable[:1] == tuple(hint.probable[:1]) else "practice",
+        causes,
+        tuple(text for text in hint.check if text not in decided),
+        excluded,
+        hint.confidence if first == hint.probable[0] else "practice",
     )
 
 
@@ -148,6 +192,7 @@ def hint_markdown(
     lines = []
     if left.probable:
         lines.append(f"- Probably ({TRUST[left.confidence]}): {_joined(left.probable)}")
+    lines += [f"- {known.text}: {known.reason}." for known in left.supported]
     if left.check:
         lines.append(f"- Check (general practice): {_joined(left.check)}")
     lines += [f"- {advice.text}: {advice.reason}." for advice in left.excluded]

@@ -10,7 +10,7 @@ from tui.drive.blocks.assignment import slot_target
 from tui.drive.channel import switch_texts
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
-from tui.drive.hints import advice, hint_markdown, reset_text
+from tui.drive.hints import advice_now, hint_markdown, reset_text
 from tui.drive.model import model_read
 from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
@@ -195,7 +195,7 @@ class _Report:
             reset = reset_text(help_, None, "a fault reset").text
             held = self.values.raws
             latest = raw == held.get(self.profile.data.faults.parameter)
-            left = advice(self.profile, help_, held, latest=latest)
+            left = advice_now(self.profile, help_, held, present=False, latest=latest)
             reported = hint_markdown(self.profile, help_, left, self.text, reset)
             lines += ["", f"What {fault.code} {fault.name} points at:", "", *reported]
         return lines

@@ -155,6 +155,7 @@ class FaultField(DocumentPart):
     causes: list[str]
     checks: list[str]
     ruled_out: list[ExcludedPart]
+    supported: list[ExcludedPart]
     look_at: list[LookField]
     confidence: str | None
     source: str | None
@@ -168,17 +169,21 @@ class AlarmField(DocumentPart):
     causes: list[str]
     checks: list[str]
     ruled_out: list[ExcludedPart]
+    supported: list[ExcludedPart]
     look_at: list[LookField]
     confidence: str | None
     source: str | None
 
 
 class ExcludedPart(DocumentPart):
-    """A cause or a check that the value of a parameter rules out."""
+    """A cause or a check that the value of a parameter rules out or supports."""
 
     text: str
     code: str
     reason: str
+    source: str
+    """Source of the rule; empty if it has none."""
+    confidence: str
 
 
 class LookField(DocumentPart):

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
 from tui.drive.fault_reset import reset_codes, reset_follows
 from tui.drive.hints import (
     TRUST,
+    DecidedAdvice,
     FaultAdvice,
     ResetText,
-    advice,
+    advice_now,
     alarms_on,
     codes_to_read,
     reset_ready,
     reset_text,
 )
 from tui.session.reading import Reading, with_text
+from tui.session.shown import Quality
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -42,9 +44,12 @@ class FaultFinding:
 
     @property
     def advice(self) -> FaultAdvice | None:
-        """The causes and checks that the values leave."""
-        raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
-        return advice(self.profile, self.hint, raws, latest=True) if self.hint else None
+        """The causes, weighed by the values, and the checks that these leave."""
+        if self.hint is None:
+            return None
+        good = [r for r in self.readings.values() if r.quality is Quality.GOOD]
+        raws = {r.parameter.code: r.raw for r in good if r.raw is not None}
+        return advice_now(self.profile, self.hint, raws, present=not self.alarm)
 
     @property
     def ready(self) -> bool | None:
@@ -93,6 +98,7 @@ class _AdviceFields(TypedDict):
     causes: list[str]
     checks: list[str]
     ruled_out: list[ExcludedPart]
+    supported: list[ExcludedPart]
     look_at: list[LookField]
     confidence: str | None
     source: str | None
@@ -124,21 +130,32 @@ def alarm_field(found: FaultFinding | None) -> AlarmField | None:
 
 
 def _advice_fields(found: FaultFinding | None) -> _AdviceFields:
-    from ..documents.parts import ExcludedPart
-
     hint = found.hint if found is not None else None
     left = found.advice if found is not None else None
     return {
         "causes": list(left.probable) if left else [],
         "checks": list(left.check) if left else [],
-        "ruled_out": [
-            ExcludedPart(text=advice.text, code=advice.code, reason=advice.reason)
-            for advice in (left.excluded if left else ())
-        ],
+        "ruled_out": _decided_parts(left.excluded if left else ()),
+        "supported": _decided_parts(left.supported if left else ()),
         "look_at": _look_fields(found) if found is not None else [],
         "confidence": hint.confidence if hint else None,
         "source": hint.source if hint else None,
     }
+
+
+def _decided_parts(decided: Sequence[DecidedAdvice]) -> list[ExcludedPart]:
+    from ..documents.parts import ExcludedPart
+
+    return [
+        ExcludedPart(
+            text=advice.text,
+            code=advice.code,
+            reason=advice.reason,
+            source=advice.source,
+            confidence=advice.confidence,
+        )
+        for advice in decided
+    ]
 
 
 def _look_fields(found: FaultFinding) -> list[LookField]:
@@ -179,6 +196,7 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
         causes = "; ".join(left.probable) or "no cause is left"
         probably = f"{causes} ({TRUST[left.confidence]})"
         rows.append(("  probably", f"{found.alarm}: {probably}" if found.alarm else probably))
+        rows += [("  supported", f"{advice.text}: {advice.reason}") for advice in left.supported]
         if left.check:
             rows.append(("  check", f"{'; '.join(left.check)} ({TRUST['practice']})"))
         rows += [("  ruled out", f"{advice.text}: {advice.reason}") for advice in left.excluded]

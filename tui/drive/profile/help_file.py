@@ -5,7 +5,8 @@ It has its own file, so that a profile stays readable and a drive is displayed w
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from decimal import Decimal
 from pathlib import Path
 from typing import TypeVar
 
@@ -16,7 +17,7 @@ from tui.drive.sentences import sentence
 from ..errors import ProfileError
 from .converting import converted
 from .form import form_faults, place_label
-from .schema import AlarmHelp, FaultHelp, HelpData, Hint, ProfileData
+from .schema import AlarmHelp, CauseRule, FaultHelp, HelpData, Hint, Parameter, ProfileData
 from .shared_rows import SourceText, parsed, source_text
 from .toml_lines import TomlPath
 
@@ -60,19 +61,43 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
 
 def help_findings(data: ProfileData, reported: HelpData) -> Iterator[tuple[HelpPlace, str]]:
     """Return the rows of a help file that do not fit the profile, each with the reason."""
-    codes = {parameter.code for parameter in data.parameters}
+    parameters = {parameter.code: parameter for parameter in data.parameters}
     for place, label, hint in _hints(reported):
         for look in hint.look_at:
-            if look.code not in codes:
+            if look.code not in parameters:
                 yield place, f"{label}: look_at: there is no parameter {look.code!r}."
-        for row in hint.ruled_out:
-            if row.text not in (*hint.probable, *hint.check):
-                yield place, f"{label}: ruled_out: {row.text!r} is not in probable or check."
-            for code in (row.parameter, *(when.parameter for when in row.when)):
-                if code not in codes:
-                    yield place, f"{label}: ruled_out: there is no parameter {code!r}."
+        for key in ("ruled_out", "supported"):
+            for row in getattr(hint, key):
+                for fault in _rule_faults(row, parameters, hint, key):
+                    yield place, f"{label}: {key}: {fault}"
     yield from _faults(data, reported)
     yield from _alarms(data, reported)
+
+
+def _rule_faults(
+    row: CauseRule, parameters: Mapping[str, Parameter], hint: Hint, key: str
+) -> Iterator[str]:
+    """Yield what is wrong with a rule of the list `key`; only `ruled_out` may refer to checks."""
+    if row.text not in (*hint.probable, *(hint.check if key == "ruled_out" else ())):
+        if key == "supported":
+            yield f"{row.text!r} is not in probable."
+        else:
+            yield f"{row.text!r} is not in probable or check."
+    if unknown := [code for code in row.codes if code not in parameters]:
+        yield from (f"there is no parameter {code!r}." for code in dict.fromkeys(unknown))
+        return
+    if not row.has_condition:
+        yield f"the rule for {row.text!r} has no values and no limits."
+    unit = parameters[row.parameter].unit
+    limits = [limit for limit in row.of if limit is not None]
+    if not unit and (limits or row.at_least is not None or row.at_most is not None):
+        yield f"{row.parameter} has no unit: use values, or min and max."
+    for limit in limits:
+        if unit and (other := parameters[limit.parameter].unit) != unit:
+            yield f"{row.parameter} in {unit} cannot be compared with {limit.parameter} in {other}."
+    low, high = row.at_least, row.at_most
+    if low is not None and high is not None and Decimal(low) > Decimal(high):
+        yield f"at_least {low} is above at_most {high}."
 
 
 def _hints(reported: HelpData) -> Iterator[tuple[HelpPlace, str, Hint]]:

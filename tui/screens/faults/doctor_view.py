@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tui.drive.fault_reset import reset_follows
-from tui.drive.hints import FaultAdvice, advice, reset_ready
+from tui.drive.hints import FaultAdvice, advice_now, reset_ready
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import FaultCode, FaultHelp, Hint, LookAt
 from tui.session.monitor.alarms import PresentFault
@@ -65,7 +65,9 @@ class DoctorView:
         if self.hint is None:
             return None
         latest = self.present or self.record is not None
-        return advice(self.profile, self.hint, self._good(), latest=latest)
+        return advice_now(
+            self.profile, self.hint, self._good(), present=self.present, latest=latest
+        )
 
     @property
     def look_at(self) -> Sequence[LookAt]:

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
+from tui.drive.causes import KnownValues
 from tui.drive.hints import advice, hint_markdown, reset_text
 from tui.drive.plain import plain
 from tui.drive.profile.schema import FaultCode
@@ -18,11 +19,13 @@ from tui.drive.values import NOT_AVAILABLE
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal
-from ..shown import Shown
+from ..shown import Quality, Shown
 from .snapshot import Snapshot
 
 SECONDS_KEPT = 30.0
 """Seconds before a trip that are kept."""
+TRIP_NEAR = 2.0
+"""Seconds between a value and the last cycle before a trip for it to count as that of the trip."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +52,20 @@ class FaultRecord:
     moments: tuple[Moment, ...]
     writes: tuple[Entry, ...]
     """Writes to the drive in these seconds, oldest first."""
+    before: Mapping[str, Shown] = field(default_factory=dict)
+    """Last values before the trip, by code, also those of the slow rate."""
+
+    @property
+    def raws(self) -> dict[str, int]:
+        """Raw values that were good and at most TRIP_NEAR old in the last cycle before the trip."""
+        last = max((reading.time for reading in self.before.values()), default=0.0)
+        return {
+            code: reading.raw
+            for code, reading in self.before.items()
+            if reading.quality is Quality.GOOD
+            and reading.raw is not None
+            and reading.age(last) <= TRIP_NEAR
+        }
 
 
 @dataclass(slots=True)
@@ -95,7 +112,11 @@ class Recorder:
             Moment(s.time, s.wall, s.state.headline, tuple(_text(s.readings.get(c)) for c in codes))
             for s, _ in self._moments
         )
-        return FaultRecord(now.time, now.wall, now.state.fault, codes, headings, moments, writes)
+        earlier = [snapshot for snapshot, _ in self._moments if snapshot is not now]
+        before = earlier[-1].readings if earlier else {}
+        return FaultRecord(
+            now.time, now.wall, now.state.fault, codes, headings, moments, writes, before
+        )
 
     def acknowledge(self) -> None:
         """Note that a person has viewed the record."""
@@ -124,11 +145,13 @@ def record_text(
     record: FaultRecord,
     stored: Sequence[tuple[str, str, str]],
     values: Mapping[str, str] | None = None,
+    known: KnownValues | None = None,
 ) -> str:
     """Format a record as Markdown: fault, likely causes, the drive's stored data, values, writes.
 
     `stored` lists code, name and value of the drive's own data about its last fault. `values` maps
-    codes to the texts of parameters that the causes mention.
+    codes to the texts of parameters that the causes mention, and `known` weighs these causes;
+    without it only the values before the trip do.
     """
     fault = record.fault
     name = (
@@ -145,7 +168,7 @@ def record_text(
     ]
     lines += [f"- Cause: {fault.cause}"] if fault and fault.cause else []
     lines += [f"- Remedy: {fault.remedy}"] if fault and fault.remedy else []
-    lines += _pointed_at(session, fault, values or {})
+    lines += _pointed_at(session, fault, values or {}, known or KnownValues(trip=record.raws))
     if stored:
         lines += ["", "## Stored by the drive", "", "| code | name | value |", "|---|---|---|"]
         lines += [f"| {code} | {name} | {value} |" for code, name, value in stored]
@@ -164,7 +187,7 @@ def record_text(
 
 
 def _pointed_at(
-    session: DriveSession, fault: FaultCode | None, values: Mapping[str, str]
+    session: DriveSession, fault: FaultCode | None, values: Mapping[str, str], known: KnownValues
 ) -> list[str]:
     """Return the likely causes of the fault as Markdown lines; empty if none are known."""
     help_ = session.profile.guide.fault(fault.raw if fault else None)
@@ -173,7 +196,7 @@ def _pointed_at(
     reported = hint_markdown(
         session.profile,
         help_,
-        advice(session.profile, help_, session.image.trusted, latest=True),
+        advice(session.profile, help_, known),
         lambda code: values.get(code, NOT_AVAILABLE),
         reset_text(help_, None, "a fault reset").text,
     )

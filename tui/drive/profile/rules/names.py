@@ -123,6 +123,9 @@ def _fault_names(data: ProfileData) -> Iterator[NamedPlace]:
     for place, stored in enumerate(data.faults.stored):
         for inner, code in enumerate(stored):
             yield ("faults", "stored", place, inner), code
+    for key in ("stored_from", "held"):
+        for place, code in enumerate(getattr(data.faults, key)):
+            yield ("faults", key, place), code
     if ready := data.faults.reset_ready:
         yield ("faults", "reset_ready"), ready.parameter
     for place, row in enumerate(data.faults.after_reset):

@@ -41,13 +41,13 @@ from .chart import (
 )
 from .fault_help import (
     AlarmHelp,
+    CauseRule,
     FaultHelp,
     HelpConfidence,
     HelpData,
     Hint,
     LookAt,
     ResetWay,
-    RuledOut,
 )
 from .identification import (
     Erratum,
@@ -122,6 +122,7 @@ __all__ = [
     "BitNumber",
     "Block",
     "BlockChoice",
+    "CauseRule",
     "ChannelBits",
     "ChannelRow",
     "ChannelSwitch",
@@ -187,7 +188,6 @@ __all__ = [
     "ReadShapes",
     "ReferenceWay",
     "ResetWay",
-    "RuledOut",
     "ScaleBy",
     "ScaleWhen",
     "SearchTopic",

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import BitNumber, RawWord, Table, When
+from .base import BitNumber, RawWord, SignedDecimalText, Table, When, WordAddress
+from .parameter import Multiple
 
 HelpConfidence = Literal["manual", "public", "practice"]
 """Certainty of the first cause; `practice` is general practice, from no document."""
@@ -24,28 +24,58 @@ class LookAt(Table, frozen=True, kw_only=True):
     why: str
 
 
-class RuledOut(Table, frozen=True, kw_only=True):
-    """A cause or a check that the value of a parameter rules out."""
+class CauseRule(Table, frozen=True, kw_only=True):
+    """Values of a parameter that rule out a cause or a check, or support a cause.
+
+    All given conditions must hold; at least one is needed.
+    """
 
     text: str
     """The cause or check, word for word as in `probable` or `check`."""
     parameter: str
+    """The live parameter: the value that the drive stored from it at the trip is used first."""
+    mask: WordAddress | None = None
+    """Bits of the word that `values` refers to; absent: all."""
     values: list[int] = []
-    """Raw values that rule it out."""
+    """Raw values for which the rule holds."""
     min: int | None = None
-    """With `max`: the lowest raw value that rules it out."""
+    """With `max`: the lowest raw value for which it holds."""
     max: int | None = None
-    """With `min`: the highest raw value that rules it out."""
+    """With `min`: the highest raw value for which it holds."""
+    at_least: SignedDecimalText | None = None
+    """Lowest value for which it holds, in the parameter's unit."""
+    at_most: SignedDecimalText | None = None
+    """Highest value for which it holds, in the parameter's unit."""
+    at_least_of: Multiple | None = None
+    """Lowest value for which it holds, as a multiple of another parameter of the same unit."""
+    at_most_of: Multiple | None = None
+    """Highest value for which it holds, as a multiple of another parameter of the same unit."""
     when: list[When] = []
     """Conditions; their words must be known."""
+    at: Literal["trip", "now"] | None = None
+    """Time of the value: `trip` for a motor current, which is 0 after it; `now` for a motor that
+    must cool. Absent: the value at the trip, or the present one if that is not known."""
+    weight: Annotated[int, Meta(ge=1, le=3)] = 1
+    """Strength of the support: 1 for a hint, 3 if it explains the fault alone."""
+    source: str = ""
+    confidence: HelpConfidence = "practice"
 
-    def holds(self, raws: Mapping[str, int]) -> bool:
-        """True if it is ruled out; an unknown value rules out nothing."""
-        raw = raws.get(self.parameter)
-        if raw is None or not all(when.holds(raws) for when in self.when):
-            return False
-        within = self.min is not None and self.max is not None and self.min <= raw <= self.max
-        return raw in self.values or within
+    @property
+    def has_condition(self) -> bool:
+        """True if it can hold at all."""
+        raw = bool(self.values) or (self.min is not None and self.max is not None)
+        return raw or any(limit is not None for limit in (self.at_least, self.at_most, *self.of))
+
+    @property
+    def of(self) -> tuple[Multiple | None, Multiple | None]:
+        """Its limits that follow other parameters, the lower one first."""
+        return self.at_least_of, self.at_most_of
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        """Codes of the parameters that it needs, its own first."""
+        limits = (limit.parameter for limit in self.of if limit is not None)
+        return (self.parameter, *limits, *(when.parameter for when in self.when))
 
 
 class Hint(Table, frozen=True, kw_only=True):
@@ -55,8 +85,10 @@ class Hint(Table, frozen=True, kw_only=True):
     """Probable causes, the likeliest first."""
     check: list[str] = []
     look_at: list[LookAt] = []
-    ruled_out: list[RuledOut] = []
+    ruled_out: list[CauseRule] = []
     """Causes and checks that a value can rule out."""
+    supported: list[CauseRule] = []
+    """Causes that a value can support; they are shown before those without support."""
     source: str = ""
     confidence: HelpConfidence = "practice"
 

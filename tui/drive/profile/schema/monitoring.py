@@ -81,6 +81,11 @@ class Faults(Table, frozen=True, kw_only=True):
     history: list[str] = []
     stored: list[list[str]] = []
     """Values that the drive stores for each fault of its history, in the same order."""
+    stored_from: list[str] = []
+    """Live parameters that the stored values are taken from, in the order of each list of `stored`.
+    Empty texts stand for values without one."""
+    held: list[str] = []
+    """Parameters that keep their value at the trip while the drive is in fault."""
     codes: list[FaultCode] = []
     help: list[FaultHelp] = []
     """Help on faults; a file of the folder `help` contains it if a family has many."""
