@@ -1,20 +1,28 @@
-"""A stop is followed until the motor is at standstill: what it reports if that takes long."""
+"""Stops of a drive without a wire: their order, what follows them, and their reports."""
 
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
-from tui.bus.api import Priority
+from tui.bus.api import LineStatus, Priority
+from tui.bus.errors import LineLost, NoAnswer
+from tui.bus.requests import Read, WriteOne
 from tui.drive.profile import library
+from tui.drive.profile.schema import OrderId
 from tui.session.clock import Clock
+from tui.session.command import stop as stops
+from tui.session.command.motor_stop import FirstWave, MotorStop
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import OVER, Phase, StopReport
 from tui.session.drive import DriveSession
+from tui.session.events import EventLog
 from tui.session.journal import Journal
+from tui.session.settings.write import Writer
 
 from .fakes import OneDrive
 
@@ -101,3 +109,249 @@ async def test_motor_that_does_not_slow_down_is_not_stopped() -> None:
     assert report.phase is Phase.FAILED
     assert "it answers and runs on" in report.text
     assert 1.5 <= clock.now - 1000.0 < 10.0
+
+
+# -- one stop, step by step ------------------------------------------------------------------------
+
+
+@pytest.fixture
+def journal() -> Iterator[Journal]:
+    """A journal in the test's own folder."""
+    made = Journal()
+    yield made
+    made.close()
+
+
+class OneStop:
+    """A stop of a drive, and all that it reports."""
+
+    def __init__(
+        self, drive: Ramp, journal: Journal, order: OrderId = "stop", wave: FirstWave | None = None
+    ) -> None:
+        self.drive = drive
+        self.reports: list[tuple[Phase, str, float]] = []
+        self.session = DriveSession(drive, 1, PROFILE, clock=drive.clock)
+        writer = Writer(self.session, journal, None)
+        self.stop = MotorStop(
+            self.session, writer, order, drive.clock.now,
+            lambda _, *report: self.reports.append(report), wave=wave,
+        )  # fmt: skip
+
+    @property
+    def written(self) -> list[int]:
+        """The words that were written, in their order."""
+        return [item.value for item in self.drive.requests if isinstance(item, WriteOne)]
+
+
+async def turns(count: int = 50) -> None:
+    """Let other work go on as far as it can."""
+    for _ in range(count):
+        await asyncio.sleep(0)
+
+
+async def test_wave_sends_its_word_before_it_reads_and_waits_for_the_others(
+    journal: Journal,
+) -> None:
+    wave = FirstWave([1, 2])
+    here = OneStop(Ramp(OwnTime(), 0.0), journal, wave=wave)
+    assert (here.stop.begun, here.stop.sent, here.stop.taken, here.stop.over) == (False,) * 4
+    work = asyncio.create_task(here.stop.carry_out())
+    async with asyncio.timeout(20.0):
+        while not here.stop.taken:  # noqa: ASYNC110 - the journal has a thread
+            await asyncio.sleep(0)
+    await turns()
+    assert (here.drive.requests, here.written) == ([WriteOne(1, COMMAND, 7)], [7])
+    assert (here.stop.begun, here.stop.sent) == (True, True)
+    wave.passed(2)
+    assert await work is None
+    assert here.written == [7], "an acknowledged word is not sent twice"
+    assert {time for *_, time in here.reports} == {1000.0}
+    assert [phase for phase, *_ in here.reports] == [Phase.STOPPING, Phase.STOPPED]
+
+
+async def test_second_attempt_of_a_stop_reads_and_sends_again_without_a_wave(
+    journal: Journal,
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal, wave=FirstWave([1, 2]))
+    here.stop.sent = True
+    assert await here.stop.carry_out() is None
+    assert here.written == [7]
+    assert await here.stop.carry_out() is None
+    assert here.written == [7, 7], "the first acknowledgment does not count for it"
+
+
+async def test_unanswered_word_counts_as_sent_and_as_a_command_of_this_program(
+    journal: Journal,
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    here.drive.fail_write(1, COMMAND, NoAnswer(1, 6, COMMAND))
+    assert not here.session.reported_by_line
+    with pytest.raises(NoAnswer):
+        await here.stop.carry_out()
+    assert here.stop.sent
+    assert not here.stop.taken
+    assert here.stop.answered is None
+    assert here.session.reported_by_line, "its word is not that of another program"
+    assert here.reports == [(Phase.STOPPING, "Ramp stop", 1000.0)]
+
+
+async def test_stop_reads_its_command_word_again_only_if_it_keeps_bits_of_it(
+    journal: Journal,
+) -> None:
+    for held in (None, 0x000F):
+        here = OneStop(Ramp(OwnTime(), 0.0), journal)
+        if held is not None:
+            here.session.image.confirm("CMD", held, 1000.0)
+        await here.stop.carry_out()
+        after = here.drive.requests.index(WriteOne(1, COMMAND, 7))
+        reads = [cast(Read, request) for request in here.drive.requests[after + 1 :]]
+        registers = [request.address + n for request in reads for n in range(request.count)]
+        assert (COMMAND in registers) == (held is not None)
+
+
+async def test_motion_is_the_kind_of_state_and_the_frequency_without_its_sign(
+    journal: Journal,
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    chart = PROFILE.data.charts[0]
+    here.drive.registers[HERTZ] = 0x10000 - 125
+    assert await here.stop._motion(chart) == ("running", 12.5)
+    here.drive.registers[STATUS] = SWITCHED_ON
+    assert (await here.stop._motion(chart))[0] == "stopped"
+
+
+@pytest.mark.parametrize(
+    ("hertz", "seconds"),
+    [
+        ([30.0], 1.65),
+        ([30.0, 30.0, 29.0], 1.95),
+        ([30.0, 31.0, 31.0], 1.65),
+        ([0.0, 0.5, 0.5], 1.65),
+        ([0.5, 0.5, 0.0], 1.95),
+    ],
+)
+async def test_motor_runs_on_if_it_has_not_slowed_down_for_the_time_it_has_to_obey(
+    hertz: list[float], seconds: float, journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    seen = iter(hertz)
+    last = hertz[-1]
+
+    async def motion(_: object) -> tuple[str, float]:
+        return "running", next(seen, last)
+
+    monkeypatch.setattr(MotorStop, "_motion", lambda _, chart: motion(chart))
+    monkeypatch.setattr("tui.session.command.motor_stop.last_word", lambda *_: None)
+    why = await here.stop.carry_out()
+    assert why is not None
+    assert here.drive.clock.now - 1000.0 == pytest.approx(seconds, abs=0.01)
+    assert ("still enabled" in why) == (last == 0.0)
+
+
+@pytest.mark.parametrize(
+    ("status", "read_ago", "rest_ago", "certain"),
+    [
+        (RUNNING, 0.0, None, True),
+        (RUNNING, 60.0, None, True),
+        (RUNNING, 60.0, 90.0, True),
+        (RUNNING, 60.0, 30.0, False),  # it may have been changed at rest since
+        (SWITCHED_ON, 60.0, None, False),
+        (SWITCHED_ON, 0.0, None, True),
+        (None, 60.0, None, False),
+    ],
+)
+def test_setting_that_cannot_change_while_the_motor_runs_is_certain(
+    status: int | None, read_ago: float, rest_ago: float | None, certain: bool, journal: Journal
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    assert PROFILE["CHCF"].access == "rw-stopped"
+    here.session.image.confirm("CHCF", 1, 1000.0 - read_ago)
+    if status is not None:
+        here.session.image.confirm("ETA", status, 1000.0)
+    if rest_ago is not None:
+        here.session.rest_seen = 1000.0 - rest_ago
+    assert here.stop._sure(["CHCF", "FR1"]) == ({"CHCF": 1} if certain else {})
+
+
+# -- several stops ---------------------------------------------------------------------------------
+
+
+async def until_over(stopper: Stopper, devices: Sequence[int]) -> None:
+    async with asyncio.timeout(20.0):
+        while any(  # noqa: ASYNC110 - as the drive's clock goes
+            stopper.reports[device].phase not in OVER for device in devices
+        ):
+            await asyncio.sleep(0)
+
+
+async def test_phases_of_a_stop_are_events_with_the_time_at_which_each_began(
+    journal: Journal,
+) -> None:
+    drive, events = Ramp(OwnTime(), 5.0), EventLog()
+    stopper = Stopper(drive, journal, events)
+    seen: dict[Phase, float] = {}
+    stopper.stop([DriveSession(drive, 1, PROFILE, clock=drive.clock)])
+    while (report := stopper.reports[1]).phase not in OVER:
+        seen[report.phase] = report.since
+        assert report.time == 1000.0
+        await asyncio.sleep(0)
+    assert seen == {Phase.SENDING: 1000.0, Phase.STOPPING: 1000.0}
+    assert report.since == drive.clock.now >= 1005.0
+    assert [(event.kind, event.text, event.device) for event in events.events] == [
+        ("stop", "The stop waits for the line.", 1),
+        ("stop", "Stopping: Ramp stop", 1),
+        ("stop", "The motor is stopped.", 1),
+    ]
+
+
+@pytest.mark.parametrize("given", [True, False])
+async def test_stop_is_given_to_all_programs_unless_they_know_of_it(
+    given: bool, journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive, heard = Ramp(OwnTime(), 0.0), []
+    monkeypatch.setattr(drive.facts, "give_stop", lambda *these: heard.append(these))
+    session = DriveSession(drive, 1, PROFILE, clock=drive.clock)
+    stopper = Stopper(drive, journal)
+    stopper.stop([session], by="a test", given=given)
+    assert heard == ([] if given else [([1], "a test")])
+    await until_over(stopper, [1])
+
+
+async def test_wave_does_not_wait_for_a_drive_that_answers_nothing(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = Ramp(OwnTime(), 0.0)
+    silent = DriveSession(drive, 2, PROFILE, clock=drive.clock)
+    with pytest.raises(NoAnswer):
+        await drive.read(2, STATUS)
+    waves: list[list[int]] = []
+
+    class Wave(FirstWave):
+        def __init__(self, devices: Any) -> None:
+            waves.append(list(devices))
+            super().__init__(waves[-1])
+
+    monkeypatch.setattr(stops, "FirstWave", Wave)
+    stopper = Stopper(drive, journal)
+    live = DriveSession(drive, 1, PROFILE, clock=drive.clock)
+    stopper.stop([silent, live])
+    assert waves == [[1]]
+    assert [work.stop.session.device for work in stopper._under_way.values()] == [1, 2]
+    await until_over(stopper, [1, 2])
+    assert stopper.reports[1].phase is Phase.STOPPED
+    assert stopper.reports[2].phase is Phase.FAILED
+
+
+async def test_stop_of_a_lost_line_is_left_to_the_prepared_frames(journal: Journal) -> None:
+    drive = Ramp(OwnTime(), 0.0)
+    stopper = Stopper(drive, journal)
+    sent: list[tuple[object, ...]] = []
+
+    def send(session: DriveSession, ordered: float, error: Exception, *, taken: bool) -> None:
+        sent.append((session.device, ordered, type(error), taken))
+
+    stopper._last = cast(Any, SimpleNamespace(send=send))
+    drive.become(LineStatus.LOST, "unplugged")
+    stopper.stop([DriveSession(drive, 1, PROFILE, clock=drive.clock)])
+    await turns()
+    assert sent == [(1, 1000.0, LineLost, False)]

@@ -264,7 +264,7 @@ class MotorStop:
                 await self._send(chart, ending)
                 progress, ending = self.session.clock.monotonic(), None
                 continue
-            slows = None not in (hertz, before) and (hertz or 0) < (before or 0)
+            slows = hertz is not None and before is not None and hertz < before
             if kind != "running" or slows:
                 progress = now
             if now - progress > TAKES_EFFECT:
