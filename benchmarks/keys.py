@@ -13,17 +13,20 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import subprocess
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
-from tests.line.terminal import Terminal
+from tests.line.terminal import Terminal, runs
+from tests.programs import kill_keepers, wait_until
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
@@ -95,8 +98,8 @@ TASKS = (
     ),
     Task(
         "put the motor current into a scanner slot",
-        [("4", "Scanner"), ("Enter", "is mapped to"), *typed("LCR"), ("Enter!", "proposed"), ARM,
-         ("w", "Write 1"), ("y!", "Written and read back")],
+        [("4", "Scanner"), ("Enter", "Map NMA1 to"), *typed("LCR"), ("Enter!", "1 staged"), ARM,
+         ("w", "Write 1"), ("y!", "all verified")],
         [("4", "Scanner"), ("Enter", "stands for"), *typed("LCR"), ("Enter", "proposed"),
          ("w", "Write 1"), ("y", "Written and read back")],
     ),
@@ -142,17 +145,25 @@ def main() -> None:
         terminal = Terminal(("tmux", "-S", f"{folder}/tmux", "-f", os.devnull))
         command = f"cd {folder} && exec {sys.executable} -m tui {line}"
         terminal.run("new-session", "-d", "-x", "80", "-y", "24", command)
-        # version 0.1 had its cursor on another line until the search had ended
-        terminal.wait_for("addresses answered" if arguments.before else "1 found")
-        time.sleep(1.0)
-        for task in TASKS:
-            steps = task.before if arguments.before else task.now
-            task.prepare(simulation.drive(1))
-            time.sleep(1.2)
-            begun = time.monotonic()
-            for step in steps:
-                press(terminal, step)
-            found[task.name] = {"keys": len(steps), "seconds": time.monotonic() - begun}
+        panel = terminal.client()
+        try:
+            # version 0.1 had its cursor on another line until the search had ended
+            terminal.wait_for("addresses answered" if arguments.before else "1 found")
+            time.sleep(1.0)
+            for task in TASKS:
+                steps = task.before if arguments.before else task.now
+                task.prepare(simulation.drive(1))
+                time.sleep(1.2)
+                begun = time.monotonic()
+                for step in steps:
+                    press(terminal, step)
+                found[task.name] = {"keys": len(steps), "seconds": time.monotonic() - begun}
+        finally:
+            # a failed task leaves the panel open; it and the keeper write into the folder
+            with suppress(subprocess.CalledProcessError):
+                terminal.run("kill-server")
+            wait_until(lambda: not runs(panel), "the end of the panel")
+            kill_keepers(Path(folder) / "lines")
     table = Table("task", "keys", "s")
     for name, figures in found.items():
         table.add_row(name, f"{figures['keys']:.0f}", f"{figures['seconds']:.1f}")
