@@ -104,7 +104,7 @@ class Trail:
                 while before[found[0]]:
                     found.insert(0, before[found[0]])
                 return found
-            for giver, taker in self.edges:
+            for giver, taker in list(self.edges):  # other threads may be watched
                 if giver == here and taker not in before:
                     before[taker] = here
                     waiting.append(taker)

@@ -355,7 +355,7 @@ async def test_owner_with_mutated_messages_serves_and_stops(
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
         await owner.read(1, 1)
-        for data in batches(chance.sample(mutants(), 1500)):
+        for data in batches(chance.sample(mutants(), 800)):
             for item in data:
                 with raw(lines) as connection, suppress(OSError):
                     connection.sendall(greeting + item + NO_MESSAGE)

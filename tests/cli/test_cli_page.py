@@ -53,6 +53,7 @@ EXAMPLES = {
 
 LONG = {
     "run", "hold", "simulate", "serve", "prove", "listen", "scan", "backup", "bundle", "restore",
+    "why", "publish", "counters", "status", "watch",
 }  # fmt: skip
 """Slow commands with their own tests: their examples are for the sweeps."""
 SHORT = [text for text in EXAMPLES.values() if not LONG & {*commands_of(text)}]

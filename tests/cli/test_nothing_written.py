@@ -21,6 +21,8 @@ from tests.programs import drivepanel
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
+from .commands import ended
+
 WRITES = frozenset({5, 6, 15, 16, 22, 23})
 RESET_COUNTERS = b"\x08\x00\x0a"
 
@@ -132,17 +134,27 @@ REFUSED = {
 }  # fmt: skip
 
 
-MAIN = (
-    "run at a reference, interlock", "reference above a limit", "run, another scale",
-    "write, motor runs", "run, read-only", "reset, no fault", "another family", "run, not armed",
-)  # fmt: skip
-"""The refusals outside the sweeps; each is a separate process."""
+PROCESSES = ("run, not armed", "run at a reference, interlock", "run, another scale")
+"""The refusals of `run` outside the sweeps."""
+
+
+def errors_of(status: int, command: str, *words: str) -> str:
+    """End with this status; return standard error. `run` needs a process of its own."""
+    if command != "run":
+        return ended(status, command, *words).stderr
+    done = drivepanel(command, *words)
+    assert done.returncode == status, done.stderr
+    return done.stderr
 
 
 @pytest.mark.parametrize(
     "case",
     [
-        pytest.param(case, id=name, marks=() if name in MAIN else pytest.mark.sweep)
+        pytest.param(
+            case,
+            id=name,
+            marks=() if case.words[0] != "run" or name in PROCESSES else pytest.mark.sweep,
+        )
         for name, case in REFUSED.items()
     ],
 )
@@ -151,18 +163,18 @@ def test_status_5_means_that_nothing_was_written(case: Refused) -> None:
     with counted(case.family, sets=case.sets, run_hz=case.run_hz) as served:
         command, *more = case.words
         profile = ("-p", MIXER) if case.family == MIXER else ()
-        done = drivepanel(command, served.line, *more, *profile)
-        assert (done.returncode, served.writes) == (case.status, []), done.stderr
-        assert case.says in done.stderr
+        errors = errors_of(case.status, command, served.line, *more, *profile)
+        assert served.writes == []
+        assert case.says in errors
 
 
 def test_nothing_is_restored_or_loaded_unarmed(tmp_path: Path) -> None:
     with counted("atv71") as served:
         kept, slots = str(tmp_path / "set.toml"), str(tmp_path / "slots.toml")
-        assert drivepanel("backup", served.line, kept).returncode == 0
-        assert drivepanel("block", served.line, "save", slots).returncode == 0
+        ended(0, "backup", served.line, kept)
+        ended(0, "block", served.line, "save", slots)
         for words in (("restore", served.line, kept), ("block", served.line, "load", slots)):
-            assert drivepanel(*words).returncode == 5
+            ended(5, *words)
         assert served.writes == []
 
 
@@ -190,9 +202,9 @@ def test_unknown_unit_of_the_reference_exits_with_2(command: tuple[str, ...]) ->
     installed_mixer(PERCENT)
     word = ("--reference", "20Hz") if command == RUN else ("20Hz",)
     with counted(MIXER) as served:
-        done = drivepanel(command[0], served.line, *word, *command[1:], "-p", MIXER)
-        assert (done.returncode, served.writes) == (2, []), done.stderr
-        assert "REF takes its reference in %. Type it like 40%." in done.stderr
+        errors = errors_of(2, command[0], served.line, *word, *command[1:], "-p", MIXER)
+        assert served.writes == []
+        assert "REF takes its reference in %. Type it like 40%." in errors
 
 
 def test_interlock_lost_during_the_start_exits_with_4() -> None:

@@ -37,7 +37,7 @@ def line() -> Iterator[str]:
         yield line
 
 
-@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "varmeca"))
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "varmeca"))
 def test_drive_equals_its_own_backup(family: str, tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     drive = (f"sim:{family}@3", "-d", "3", "-p", family)

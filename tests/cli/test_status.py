@@ -77,8 +77,7 @@ def test_unanswered_read_with_profile_exits_with_3() -> None:
 @pytest.mark.parametrize("extra", [(), ("--json",)])
 def test_watch_without_any_value_exits_with_3(extra: tuple[str, ...]) -> None:
     watch = ("watch", SIM, "ETA", "-d", "9", "-p", "atv71", "--count", "2", "--every", "0.1")
-    done = drivepanel(*watch, *extra)
-    assert done.returncode == 3, done.stdout
+    done = ended(3, *watch, *extra)
     assert done.stderr.startswith("drivepanel: Device 9 does not answer")
 
 
@@ -92,13 +91,12 @@ def test_missing_port_exits_with_3() -> None:
 
 def test_refusal_by_the_drive_exits_with_4() -> None:
     with tcp_line("atv71@2", "--protect", "ACC") as line:
-        done = drivepanel("read", line, "ACC", "-d", "2")
-        assert done.returncode == 4
+        done = ended(4, "read", line, "ACC", "-d", "2")
         assert "ACC" in done.stderr
         assert "exception 2" in done.stderr
         # the drive answers, so watching it is not a line failure
         watch = ("watch", line, "ETA", "ACC", "-d", "2", "--count", "1", "--json")
-        assert drivepanel(*watch).returncode == 0
+        ended(0, *watch)
 
 
 @pytest.mark.parametrize("refusal", [RequestRefused, ValueRefused])
@@ -140,8 +138,7 @@ def test_unwritable_log_does_not_stop_commands(
 
 def test_read_only_lines_can_be_read() -> None:
     for command in (("read", SIM, "ETA"), ("identify", SIM), ("watch", SIM, "ETA", "--count", "1")):
-        done = drivepanel(*command, "-d", "2", "--read-only", "--json")
-        assert done.returncode == 0, done.stderr
+        ended(0, *command, "-d", "2", "--read-only", "--json")
 
 
 def expect(status: int, *arguments: str) -> None:

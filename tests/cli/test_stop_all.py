@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from tests.sweeps import kept
 from tui.bus.api import Priority
 from tui.bus.errors import ChecksumFault, LineError
 from tui.bus.fake import FakeLine
@@ -72,7 +73,7 @@ GUESSED = "NOT STOPPED: it is not known if the motor stopped"
 WAYS = [("-d", "1"), ("--all", "--addresses", "1"), ("-d", "1", "-d", "2")]
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", kept(WAYS, WAYS[0], WAYS[2]))
 def test_stop_of_a_guessed_family_reports_not_stopped(way: tuple[str, ...]) -> None:
     with tcp_line("powerdrive@1", "atv71@2") as line:
         done = ended(4, "stop", line, *way)
@@ -100,7 +101,7 @@ def test_recorded_start_sets_the_family_unless_it_was_a_guess(
         assert (GUESSED in done.stderr) is guessed
 
 
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", kept(WAYS, WAYS[2]))
 def test_named_profile_overrides_a_profile_with_the_same_reference(
     way: tuple[str, ...],
 ) -> None:

@@ -14,11 +14,13 @@ import pytest
 
 from tests.programs import PATIENCE
 from tests.sources import ROOT
+from tests.sweeps import kept
 from tests.test_packages import build
 
 PAGE = ROOT / "docs" / "api.md"
 EXAMPLES = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
 WRONG = """
+from tests.sweeps import kept
 from tui.session.api import open_drives
 
 with open_drives("sim:atv71") as line:
@@ -60,12 +62,14 @@ def checked(user: Path, *scripts: str) -> subprocess.CompletedProcess[str]:
     return run(user, *strict, "--cache-dir", str(user / "cache"), *scripts)
 
 
+@pytest.mark.sweep
 def test_scripts_of_the_page_pass_strict_mypy(user: Path) -> None:
     done = checked(user, *(f"script_{number}.py" for number in range(len(EXAMPLES))))
     assert done.returncode == 0, done.stdout + done.stderr
     assert f"no issues found in {len(EXAMPLES)} source files" in done.stdout
 
 
+@pytest.mark.sweep
 def test_mypy_finds_wrong_uses_of_the_api(user: Path) -> None:
     done = checked(user, "wrong.py")
     assert re.findall(r"^wrong\.py:(\d+): error: .*\[(.+)\]$", done.stdout, re.M) == [
@@ -75,7 +79,7 @@ def test_mypy_finds_wrong_uses_of_the_api(user: Path) -> None:
     ], done.stdout
 
 
-@pytest.mark.parametrize("number", range(len(EXAMPLES)))
+@pytest.mark.parametrize("number", kept(range(len(EXAMPLES)), 0, 4))
 def test_script_of_the_page_runs_with_the_installed_package(user: Path, number: int) -> None:
     done = run(user, python(user), f"script_{number}.py")
     assert done.returncode == 0, done.stderr

@@ -33,11 +33,18 @@ def frames(line: Line) -> list[bytes]:
     return [frame.data for frame in line.trace if frame.direction == "out"]
 
 
+WRONGLY_NAMED = ("atv71", "powerdrive")
+"""Families outside the sweeps whose drives are named as another one."""
+
+
 @pytest.mark.parametrize(
     ("family", "named"),
     [
         *((item, "") for item in FAMILIES),
-        *((entry, "atv312") for entry in FAMILIES),
+        *(
+            pytest.param(item, "atv312", marks=() if item in WRONGLY_NAMED else pytest.mark.sweep)
+            for item in FAMILIES
+        ),
         ("atv21", "atv71"),
     ],
 )

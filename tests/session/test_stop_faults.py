@@ -46,7 +46,7 @@ ROOMS = (
 """Functions of each of these that are in none before it."""
 BOTTOM = {"TcpTransport.send"}
 """Points without which nothing can be sent: the frame passes them on every path."""
-SOME = 12
+SOME = 24
 """Every nth function outside the sweeps, which take all."""
 PARTS = 3
 """Tests that the functions of a room are divided among in the sweeps: each has a time limit."""
@@ -75,9 +75,13 @@ class Wire:
 
 @pytest.fixture(autouse=True)
 def collected() -> Iterator[None]:
-    """Leftovers of the errors end with their test: their warnings would fail a later one."""
+    """Leftovers of the errors end with their test: their warnings would fail a later one.
+
+    What is left is frozen: the next collection is of the next test only, and short.
+    """
     yield
     gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="module")

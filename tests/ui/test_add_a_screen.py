@@ -123,6 +123,7 @@ def test_added_screen_is_in_the_tables_of_the_docs(copy: Path) -> None:
     assert "| Esc | Go back to Monitor. |" in (copy / "docs/screens/load.md").read_text("utf-8")
 
 
+@pytest.mark.sweep
 def test_added_screen_has_the_right_types(copy: Path) -> None:
     """The copied package alone is checked: the rest is the project of this folder."""
     files = [str(path) for path in (copy / "tui" / "screens" / "load").glob("*.py")]

@@ -175,7 +175,14 @@ def running_view(now: float, seconds: float = 120.0, period: float = 0.5) -> Vie
     )
 
 
-@pytest.mark.parametrize(("size", "most"), [((80, 24), 6), ((120, 40), 9), ((200, 60), 14)])
+@pytest.mark.parametrize(
+    ("size", "most"),
+    [
+        ((80, 24), 6),
+        ((120, 40), 9),
+        pytest.param((200, 60), 14, marks=pytest.mark.sweep),
+    ],
+)
 def test_new_sample_changes_few_cells_until_the_page_turns(
     size: tuple[int, int], most: int
 ) -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import pytest
 
+from tests.sweeps import kept
 from tui.drive.blocks.picking import choices, raw_of
 from tui.drive.control_source import source_changes
 from tui.drive.profile import library
@@ -80,7 +81,7 @@ def alike(texts: Sequence[str]) -> list[str]:
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-@pytest.mark.parametrize("staged", [False, True])
+@pytest.mark.parametrize("staged", kept([False, True], True))
 def test_parameters_and_search_results(family: str, staged: bool) -> None:
     editor = editor_of_family(library.load(family), staged=staged)
     profile = editor.session.profile

@@ -64,7 +64,7 @@ def random_sizes(count: int, seed: int) -> list[tuple[int, int]]:
 PLACES = [*SCREENS, *DIALOGS]
 
 
-@pytest.mark.parametrize("place", kept(PLACES, *PLACES[::6]))
+@pytest.mark.parametrize("place", kept(PLACES, *PLACES[::12]))
 async def test_screens_survive_awkward_sizes(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     await resizes(monkeypatch, [*AWKWARD, *random_sizes(3, PLACES.index(place))], place)
 
