@@ -11,12 +11,12 @@ from typing import cast
 import pytest
 
 from tui.bus.api import Priority
-from tui.bus.errors import LineError, LineLost, NoAnswer
+from tui.bus.errors import LineBehind, LineError, LineLost, NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line, LineStatus, Timing
 from tui.bus.link import RtuTcpLink
 from tui.bus.master import ExchangeResult, Master, Piece, ResultKind, Sending
-from tui.bus.requests import Read, WriteOne
+from tui.bus.requests import Diagnose, Identify, Read, Request, WriteOne
 from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.in_step import InStep
 from tui.bus.schedule.outcomes import Outcomes
@@ -434,3 +434,231 @@ def test_drain_ends_at_its_time_and_leaves_requests_to_other_rules(
     line = _Line()
     line.steps.quiet_until = 5.0
     assert line.steps.not_before(Job(Read(1, 100, 1), Priority.POLL, WIDE), now) == due
+
+
+STOP_WORDS = Job(WriteOne(1, 1, 0), Priority.STOP, WIDE)
+FEW = replace(SINGLE, functions=frozenset({3, 6}))
+"""A reading and a writing form, and no other."""
+
+
+def poll(count: int = 1, limits: Limits = NO_ECHO, *, device: int = 1, register: int = 100) -> Job:
+    return Job(Read(device, register, count), Priority.POLL, limits)
+
+
+def test_line_that_is_behind_fails_everything_but_stop_words() -> None:
+    steps = _Line().steps
+    assert not steps.refuses(poll())
+    steps.behind = "Replies are one behind."
+    assert not steps.refuses(STOP_WORDS)
+    for refused in (poll(), Job(WriteOne(1, 1, 7), Priority.OPERATOR_WRITE, WIDE)):
+        assert steps.not_before(refused, 1.0) == 0.0, "immediately"
+        assert steps.refuses(refused)
+        with pytest.raises(LineBehind, match="one behind"):
+            refused.answer.result(0)
+    assert steps.not_before(STOP_WORDS, 1.0) is None
+
+
+def test_drain_holds_polls_back_and_neither_stops_nor_keep_alive_reads() -> None:
+    steps = _Line().steps
+    steps.quiet_until = 5.0
+    read = Read(1, 100, 1)
+    for priority, due in ((Priority.STOP, None), (Priority.FEED, None), (Priority.POLL, 5.0)):
+        assert steps.not_before(Job(read, priority, WIDE), 1.0) == due, priority
+        assert steps.not_before(Job(read, priority, WIDE), 5.0) is None
+
+
+@pytest.mark.parametrize("kind", [ResultKind.NOTHING, ResultKind.DAMAGED, ResultKind.WRONG])
+def test_reply_of_a_form_of_its_own_proves_the_step_until_a_reply_is_missing(
+    kind: ResultKind,
+) -> None:
+    line = _Line()
+    line.note(poll(1), ResultKind.REPLY)
+    assert line.steps._proved == set(), "nothing is known of the requests before"
+    line.note(poll(1), ResultKind.REPLY)
+    assert line.steps._proved == set()
+    line.note(poll(2), ResultKind.EXCEPTION)
+    assert line.steps._proved == set()
+    line.note(poll(3), ResultKind.REPLY)
+    assert line.steps._proved == {1}
+    line.note(poll(1, device=2), kind)
+    assert line.steps._proved == {1}, "each drive has its own"
+    line.note(poll(1), kind)
+    assert line.steps._proved == set()
+
+
+def test_missing_reply_behind_a_gateway_ends_the_proof_of_every_drive() -> None:
+    line = _Line(gateway=True)
+    line.steps._proved |= {1, 2}
+    line.note(poll(1, device=3), ResultKind.NOTHING)
+    assert line.steps._proved == set()
+
+
+@pytest.mark.parametrize(("takes", "seconds"), [(0.0, 10.0), (0.05, 10.0), (0.5, 50.0)])
+def test_buffering_connection_is_checked_at_its_time_and_seldom_if_it_is_slow(
+    takes: float, seconds: float
+) -> None:
+    line = _Line()
+    steps = line.steps
+    steps._buffers = True
+    line.note(poll(1), ResultKind.REPLY)
+    line.now += takes
+    sent = ExchangeResult(ResultKind.REPLY, sent=line.now - takes)
+    steps.note(poll(2), Read(1, 100, 2).expectation(), sent)
+    begun = line.now
+    for line.now, proved in ((begun + seconds - 0.01, True), (begun + seconds, False)):
+        steps.prepare(poll(2))
+        assert (1 in steps._proved) == proved
+
+
+def test_drive_of_few_forms_proves_its_step_by_a_reply_unlike_the_last_one() -> None:
+    line = _Line()
+    steps = line.steps
+    write = Job(WriteOne(1, 1, 7), Priority.OPERATOR_WRITE, FEW)
+    for job in (poll(limits=FEW), write):
+        line.note(job, ResultKind.REPLY)
+    steps._proved.clear()
+    line.note(poll(limits=FEW), ResultKind.REPLY)
+    assert steps._proved == set(), "it was not sent to prove anything"
+    line.note(write, ResultKind.REPLY)
+    assert steps.prepare(poll(limits=FEW)) is None
+    assert steps._weak == {1}
+    line.note(poll(limits=FEW), ResultKind.REPLY)
+    assert (steps._proved, steps._weak) == ({1}, set())
+    steps._proved.clear()
+    line.note(write, ResultKind.REPLY)
+    assert steps._proved == set(), "it counts for the next reply only"
+
+
+def test_reads_that_were_answered_can_be_probes() -> None:
+    line = _Line()
+    good: list[Read] = []
+    line.steps._probes.note_good = good.append  # type: ignore[assignment,method-assign]
+    line.note(poll(2), ResultKind.REPLY)
+    lengthened = poll(2)
+    lengthened.take_form(Read(1, 100, 4))
+    line.note(lengthened, ResultKind.REPLY)
+    assert good == [Read(1, 100, 2), Read(1, 100, 4)]
+    line.note(poll(5), ResultKind.EXCEPTION)
+    line.note(Job(WriteOne(1, 1, 7), Priority.OPERATOR_WRITE, WIDE), ResultKind.REPLY)
+    echo = Diagnose(1, 0, 77).expectation()
+    line.steps.note(poll(6), echo, ExchangeResult(ResultKind.REPLY, sent=1.0), number=True)
+    assert len(good) == 2
+
+
+def test_proof_ends_every_suspicion_and_reports_a_line_that_was_behind_once() -> None:
+    line = _Line()
+    steps, recovered = line.steps, []
+    steps.recovered = lambda: recovered.append(steps.behind)
+    for behind, times in (("", 0), ("Replies are one behind.", 1), ("", 1)):
+        steps.behind, steps._shifts, steps.quiet_until = behind, 1, 5.0
+        line.note(poll(1), ResultKind.REPLY)
+        line.note(poll(2 + times), ResultKind.NOTHING)
+        line.note(poll(4 + len(recovered)), ResultKind.REPLY)
+        steps._fall_in()
+        assert (steps.behind, steps._shifts, steps.quiet_until) == ("", 0, 0.0)
+        assert recovered == [""] * times
+
+
+@pytest.mark.parametrize(
+    ("kind", "last", "gateway", "quiet_until", "cleared"),
+    [
+        (ResultKind.REPLY, 2, False, 0.0, True),
+        (ResultKind.REPLY, 1, False, 0.0, False),
+        (ResultKind.REPLY, 2, True, 0.0, False),
+        (ResultKind.NOTHING, 2, False, 0.0, False),
+        (ResultKind.NOTHING, 1, False, 1.0, True),
+        (ResultKind.NOTHING, 1, False, 1.1, False),
+        (ResultKind.EXCEPTION, 1, True, 0.9, True),
+    ],
+)
+def test_exchange_without_an_earlier_reply_ends_a_suspicion(
+    kind: ResultKind, last: int, gateway: bool, quiet_until: float, cleared: bool
+) -> None:
+    line = _Line(gateway=gateway)
+    steps = line.steps
+    steps._last, steps._shifts, steps.quiet_until = last, 1, quiet_until
+    line.note(poll(1), kind)
+    assert steps._shifts == (0 if cleared else 1)
+    assert steps.quiet_until == (0.0 if cleared else quiet_until)
+    assert steps._last == 1
+
+
+def test_two_earlier_replies_in_a_row_drain_the_line_and_two_after_it_are_one_behind() -> None:
+    line = _Line()
+    steps = line.steps
+    jobs = [poll(count) for count in (1, 2, 3, 4)]
+    earlier = [reply(bytes([1]) + job.pdu + bytes(2)) for job in jobs]
+    line.note(jobs[0], ResultKind.NOTHING)
+    line.note(jobs[1], ResultKind.WRONG, earlier[0])
+    assert steps.quiet_until == 0.0
+    line.note(jobs[2], ResultKind.WRONG, earlier[1])
+    due = steps.quiet_until
+    assert line.now + Timing().first_timeout <= due <= line.now + 10.0
+    line.now = due - 0.01
+    line.note(jobs[3], ResultKind.WRONG, earlier[2])
+    assert not steps.behind, "sent before the line was quiet"
+    line.now = due
+    line.note(jobs[0], ResultKind.WRONG, earlier[3])
+    assert steps.behind.startswith("Replies are one behind")
+    assert steps.reopen
+    assert steps._witness is jobs[0]
+
+
+def test_frame_between_exchanges_is_late_and_not_held_back() -> None:
+    line = _Line()
+    steps = line.steps
+    steps._proved |= {1, 2}
+    steps._shifts, steps.quiet_until = 1, 5.0
+    steps.stray(Piece(reply(bytes([1]) + poll().pdu + bytes(2)), whole=True))
+    assert (steps._proved, steps._shifts, steps.quiet_until) == ({2}, 0, 0.0)
+
+
+@pytest.mark.parametrize("kind", list(ResultKind))
+def test_lengthened_read_that_is_refused_waits_again_as_itself(kind: ResultKind) -> None:
+    line = _Line()
+    noted: list[tuple[Read, ResultKind]] = []
+    line.steps._probes.forms.note = (  # type: ignore[method-assign]
+        lambda form, result: noted.append((form, result.kind))
+    )
+    result = ExchangeResult(kind, sent=0.9)
+    assert not line.steps.end_form(poll(), result)
+    assert noted == []
+    job, form = poll(), Read(1, 100, 3)
+    job.take_form(form)
+    refused = kind is ResultKind.EXCEPTION
+    assert line.steps.end_form(job, result) == refused
+    assert noted == [(form, kind)]
+    assert job.form == (None if refused else form)
+    late = line.devices.not_before(1, form.expectation(), Priority.POLL, 1.0) > 1.0
+    assert late == refused, "a copy of the refusal may come"
+
+
+@pytest.mark.parametrize(
+    ("request_", "within", "probes"),
+    [
+        (Identify(1), None, True),
+        (Read(1, 100, 1), 0.5, True),
+        (Read(1, 100, 1), None, False),
+    ],
+)
+def test_request_that_needs_no_proof_is_sent_as_it_is(
+    request_: Request, within: float | None, probes: bool
+) -> None:
+    line = _Line()
+    line.note(poll(1), ResultKind.NOTHING)
+    job = Job(request_, Priority.POLL, WIDE, within=within)
+    line.steps._timing = replace(Timing(), probes=probes)
+    assert line.steps.prepare(job) is None
+    assert (job.form, job.probes) == (None, 0)
+
+
+def test_repeat_of_a_request_without_a_reply_is_sent_as_it_was() -> None:
+    line = _Line()
+    line.note(poll(2), ResultKind.REPLY)
+    line.note(poll(1), ResultKind.NOTHING)
+    repeat, other = poll(1), poll(1, register=101)
+    repeat.repeats = other.repeats = 1
+    line.steps.prepare(repeat)
+    assert repeat.form is None
+    line.steps.prepare(other)
+    assert other.form is not None, "a late reply to the first one has its length"

@@ -8,9 +8,10 @@ from tui.bus.api import Priority
 from tui.bus.errors import LineBusy, LineClosed, Superseded
 from tui.bus.line import Timing
 from tui.bus.master import Piece
+from tui.bus.program_use import ProgramUse
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
 from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, SHORT_WAIT, Devices, pause
-from tui.bus.schedule.queue import Job, JobQueue
+from tui.bus.schedule.queue import Job, JobQueue, LineShares, SentStops
 from tui.bus.schedule.unsent import is_stop_word
 from tui.bus.trace import Trace
 from tui.wire.frames import frame
@@ -479,3 +480,107 @@ def test_time_of_the_last_reply_of_a_device() -> None:
 def test_writes_until_the_repeat_of_a_stop_are_stop_words(priority: Priority, stops: bool) -> None:
     assert is_stop_word(Job(WriteOne(1, 8501, 0), priority, WIDE)) is stops
     assert not is_stop_word(Job(Read(1, 8501, 1), priority, WIDE))
+
+
+# -- places of stops and kinds ---------------------------------------------------------------------
+
+
+def sent_stops(*tries: bool, last: bool = True) -> SentStops:
+    """The stop words of device 1 were sent at 10 s; `tries` were acknowledged or not."""
+    stops = SentStops()
+    for acknowledged in tries:
+        stops.count(stop_job(1), 10.0, acknowledged=acknowledged)
+    if not last:
+        stops.count(job(Priority.POLL), 10.0, acknowledged=True)
+    return stops
+
+
+@pytest.mark.parametrize(
+    ("tries", "last", "now", "yields"),
+    [
+        ([True], True, 10.0, True),
+        ([True], True, 12.9, True),
+        ([True], True, 13.0, False),
+        ([True], False, 10.0, False),  # another request went between
+        ([False], True, 10.0, False),
+        ([False] * 4, True, 10.0, False),
+        ([False] * 5, True, 10.0, True),
+        ([False] * 7, True, 10.0, True),
+        ([True, False], True, 10.0, False),
+        ([False] * 4 + [True], True, 10.0, True),
+    ],
+)
+def test_repeated_stop_yields_to_one_request(
+    tries: list[bool], last: bool, now: float, yields: bool
+) -> None:
+    stops = sent_stops(*tries, last=last)
+    assert stops.yields(stop_job(1), now) == yields
+    assert not stops.yields(stop_job(2), now), "another drive's"
+    assert not stops.yields(Job(WriteOne(1, 8501, 2), Priority.STOP, WIDE), now), "another word"
+    assert not stops.yields(job(Priority.POLL), now)
+
+
+@pytest.mark.parametrize(("device", "again"), [(1, False), (2, True), (0, False)])
+def test_command_makes_the_same_stop_a_first_one(device: int, again: bool) -> None:
+    stops = sent_stops(True)
+    command = Job(WriteOne(device, 8501, 15), Priority.OPERATOR_WRITE, WIDE)
+    stops.count(command, 10.0, acknowledged=True)
+    stops.count(stop_job(3), 10.0, acknowledged=True)
+    assert stops.yields(stop_job(1), 10.0) == again
+
+
+def test_stops_of_earlier_are_forgotten() -> None:
+    stops = sent_stops(True)
+    stops.count(stop_job(2), 12.9, acknowledged=True)
+    assert len(stops._sent) == 2
+    stops.count(stop_job(2), 13.0, acknowledged=True)
+    assert list(stops._sent) == [(2, stop_job(2).pdu)]
+
+
+def test_rank_is_stops_then_kinds_that_are_owed_then_kinds_and_their_programs() -> None:
+    shares = LineShares()
+    poll, stop = job(Priority.POLL), stop_job(1)
+    patient = job(Priority.PATIENT)
+    stop.order, poll.order, patient.order = 4, 5, 6
+    poll.program = patient.program = "a"
+    assert shares.rank(stop) == (0.0, 0.0, 0.0, 0.0, 4)
+    assert shares.rank(poll) == (2.0, Priority.POLL, 0.0, Priority.POLL, 5)
+    assert shares.rank(patient) == (2.0, Priority.BACKGROUND, 0.0, Priority.PATIENT, 6)
+    shares._had[Priority.POLL, "a"] = shares._had[Priority.BACKGROUND, "a"] = 0.75
+    shares._owed[Priority.POLL] = shares._owed[Priority.BACKGROUND] = 0.1
+    assert shares.rank(poll) == (2.0, Priority.POLL, 0.75, Priority.POLL, 5)
+    shares._owed[Priority.POLL] = shares._owed[Priority.BACKGROUND] = 0.2
+    assert shares.rank(poll) == (1.0, -0.2, 0.75, Priority.POLL, 5)
+    assert shares.rank(patient) == (1.0, -0.2, 0.75, Priority.PATIENT, 6)
+
+
+def test_program_that_comes_back_has_had_as_much_as_the_others() -> None:
+    queue = JobQueue(20)
+    polls = [job(Priority.POLL, address) for address in range(3)]
+    for each, program in zip(polls, "aab", strict=True):
+        each.program = program
+    queue.put(polls[0])
+    queue.take(now, 0.0)
+    queue.put(polls[1])
+    queue.count(polls[0], 0.0, 2.0, acknowledged=True)
+    queue.put(polls[2])
+    assert queue._shares._had == {(Priority.POLL, "a"): 2.0, (Priority.POLL, "b"): 2.0}
+    assert queue.take(now, 2.0)[0] is polls[1], "it makes up for no time without a request"
+
+
+def test_time_of_an_exchange_is_counted_for_its_program() -> None:
+    counted: list[tuple[str, float]] = []
+    use = ProgramUse()
+    use.count = lambda *those: counted.append(those)  # type: ignore[method-assign]
+    queue = JobQueue(20, use)
+    poll = job(Priority.POLL)
+    poll.program = "a"
+    queue.count(poll, 10.0, 10.5, acknowledged=True)
+    assert counted == [("a", 0.5)]
+
+
+def test_full_queue_reports_the_number_that_waits() -> None:
+    queue = JobQueue(2)
+    queue.put(job(Priority.POLL))
+    with pytest.raises(LineBusy, match=r"^1 requests wait for the line already; try again\.$"):
+        queue.put(job(Priority.POLL, 1))
