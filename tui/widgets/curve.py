@@ -11,7 +11,7 @@ from bisect import bisect_left, bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from itertools import groupby, pairwise
+from itertools import groupby
 from typing import NamedTuple
 
 from rich.style import Style
@@ -94,8 +94,11 @@ class CurveScale:
 
     def dot(self, value: float, dots: int) -> int:
         """Return the dot of a value, 0 at the low end; a value beyond an end has that end's dot."""
-        share = (value - self.low) / (self.high - self.low) if self.high > self.low else 0.0
-        return round(max(0.0, min(1.0, share)) * (dots - 1))
+        if value <= self.low or self.high <= self.low:
+            return 0
+        if value >= self.high:
+            return dots - 1
+        return round((value - self.low) / (self.high - self.low) * (dots - 1))
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,20 +170,19 @@ def dots_of(curve: Curve, plot: Plot, reach: float) -> list[int]:
     """
     width, height = plot.columns * plot.signs.across, plot.rows * plot.signs.down
     columns = [0] * width
-    per_second = width / plot.span
-    place: list[tuple[float, int, int] | None] = []
-    for time, value in on_page(curve.samples, plot.start, plot.end):
+    start, per_second, floor, dot = plot.start, width / plot.span, math.floor, plot.scale.dot
+    before: tuple[float, int, int] | None = None
+    # a page of ten minutes has 6,000 samples at 10 Hz: most are in the column of their predecessor
+    for time, value in on_page(curve.samples, start, plot.end):
         if value is None:
-            place.append(None)
+            before = None
             continue
-        x = math.floor((time - plot.start) * per_second)
-        y = plot.scale.dot(value, height)
-        place.append((time, x, y))
+        x, y = floor((time - start) * per_second), dot(value, height)
         if 0 <= x < width:
             columns[x] |= 1 << y
-    for before, after in pairwise(place):
-        if before is not None and after is not None and after[0] - before[0] <= reach:
-            _connect(columns, before[1:], after[1:], held=curve.held)
+        if before is not None and (x, y) != before[1:] and time - before[0] <= reach:
+            _connect(columns, before[1:], (x, y), held=curve.held)
+        before = (time, x, y)
     return [_thinned(dots, x) for x, dots in enumerate(columns)] if curve.held else columns
 
 

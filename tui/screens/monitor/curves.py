@@ -200,14 +200,14 @@ def _scale(view: View, band: Band, curves: Sequence[Curve], rows: int) -> CurveS
 
     It ends at the end of the value's bar, or at a round number above any higher value.
     """
-    seen = [abs(value) for curve in curves for _, value in curve.samples if value is not None]
-    highest = max(seen, default=0.0)
+    seen = [value for curve in curves for _, value in curve.samples if value is not None]
+    lowest, highest = min(seen, default=0.0), max(seen, default=0.0)
+    farthest = max(highest, -lowest)
     end = bar_end(view, band.parameter, band.place)
-    if highest > (end or 0.0):
-        end = round_up(highest)
+    if farthest > (end or 0.0):
+        end = round_up(farthest)
     high = end or 1.0
-    signed = any(value is not None and value < 0 for curve in curves for _, value in curve.samples)
-    return scale_of(-high if signed else 0.0, high, rows)
+    return scale_of(-high if lowest < 0 else 0.0, high, rows)
 
 
 def bar_end(view: View, parameter: Parameter, place: int) -> float | None:
@@ -215,10 +215,11 @@ def bar_end(view: View, parameter: Parameter, place: int) -> float | None:
     for value in view.values:
         if value.parameter == parameter.code and (end := end_of(view, value.high)):
             return end if end > 0 else None
-    seen = [abs(v) for point in view.trend if (v := point.values[place]) is not None]
     reading = view.reading(parameter.code)
-    seen.append(abs(reading.current_number or 0.0) if reading is not None else 0.0)
-    return round_up(max(seen)) if max(seen) > 0 else None
+    seen = [(reading.current_number or 0.0) if reading is not None else 0.0]
+    seen += [v for point in view.trend if (v := point.values[place]) is not None]
+    farthest = max(max(seen), -min(seen))
+    return round_up(farthest) if farthest > 0 else None
 
 
 def _marks(view: View, points: Sequence[TrendPoint], columns: int) -> dict[int, TrendMark]:
@@ -226,8 +227,8 @@ def _marks(view: View, points: Sequence[TrendPoint], columns: int) -> dict[int, 
     plot = _plot(view, columns, 1, CurveScale(0, 1))
     found: dict[int, TrendMark] = {}
     for point in points:
-        mark = next((item for item in TREND_MARKS if item == point.mark), None)
-        if mark is None or (column := plot.column(point.time)) is None:
+        mark = point.mark and next((item for item in TREND_MARKS if item == point.mark), None)
+        if not mark or (column := plot.column(point.time)) is None:
             continue
         before = found.get(column)
         if before is None or TREND_MARKS.index(mark) < TREND_MARKS.index(before):

@@ -181,16 +181,17 @@ def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[T
         return [Text()] * ROWS  # the cursor may hold an older page than the number beside them
     place = TREND_QUANTITIES.index(quantity)
     start, end = view.page_start, view.page_start + view.step.span
-    seen = [
-        (value, point.time)
+    page = [
+        point
         for point in points_of_page(view)
-        if start <= point.time < end and (value := point.values[place]) is not None
+        if start <= point.time < end and point.values[place] is not None
     ]
-    if not seen:
+    if not page:
         return [Text()] * ROWS
     digits = decimal_places(parameter)
-    highest, lowest = max(seen)[0], min(seen)[0]
-    covered = f"{seen[-1][1] - seen[0][1]:.0f} s"
+    seen = [value for point in page if (value := point.values[place]) is not None]
+    highest, lowest = max(seen), min(seen)
+    covered = f"{page[-1].time - page[0].time:.0f} s"
     return [
         Text("max", FAINT).append(f"{highest:>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
         Text("min", FAINT).append(f"{lowest:>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
