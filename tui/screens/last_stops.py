@@ -98,7 +98,7 @@ class LineStops:
 
     def _result(self, device: int, report: StopReport | None) -> str:
         if device in self.troubles or report is None:
-            why = self.troubles.get(device, "no stop was sent")
+            why = sentence(self.troubles.get(device, "no stop was sent"))
             return f"NOT STOPPED: {why} {AT_THE_MACHINE}"
         if report.phase.value in ("stopped", "failed"):
             return report.text if report.text.endswith(".") else f"{report.text}."
