@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from types import SimpleNamespace
 
 import pytest
 
@@ -15,9 +16,12 @@ from tests.line_events import on_event
 from tui.bus.api import Priority
 from tui.bus.bounds import MOST_CARE
 from tui.bus.errors import RequestRefused
+from tui.bus.leases import LEASE_ENDED, WriteLease, WriteLeases
 from tui.bus.line import Line
 from tui.bus.line_events import StopDue, WriteAbandoned
 from tui.bus.program import Program
+from tui.bus.share.messages import Armed
+from tui.bus.stop_counts import StopCounts
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, reply
@@ -257,3 +261,128 @@ async def test_due_stop_is_cancelled_when_the_drive_is_armed_again(share: Share)
         await asyncio.to_thread(panel.close)
         await asyncio.to_thread(eventually, lambda: due != [])
         assert due == [(2,)]
+
+
+# -- without a line --------------------------------------------------------------------------------
+
+
+class Leases:
+    """Leases of a program `me`, whose time the test sets; `sent` is reported to the holder."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        monkeypatch.setattr("tui.bus.leases.time", SimpleNamespace(monotonic=lambda: self.now))
+        self.stops = StopCounts()
+        self.sent: list[object] = []
+        self.leases = WriteLeases("me", self.stops, self.sent.append)
+
+    @property
+    def mine(self) -> WriteLease:
+        return self.leases.of("me")[1]
+
+    def refusal(self) -> str:
+        return self.leases.refusal("me", 1)
+
+
+def test_lease_lasts_for_its_time_and_one_renewal_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Leases(monkeypatch)
+    here.stops.give("other", (1,), "a test")
+    here.leases.arm(1, 60.0, CARE)
+    assert here.mine == WriteLease(1, 1061.0, CARE)
+    assert here.sent == [Armed(1, 1, 1061.0, CARE)]
+    for here.now, why in ((1061.0, ""), (1061.1, "Not sent: drive 1 is not armed now.")):
+        assert here.refusal() == why
+    assert here.leases.refusal("me", 2) == "Not sent: drive 2 is not armed by this program."
+    assert here.leases.refusal("other", 1) == "Not sent: drive 1 is not armed by this program."
+
+
+def test_lease_without_a_time_lasts_until_a_stop(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Leases(monkeypatch)
+    here.leases.arm(1, None, CARE)
+    here.now += 1e6
+    assert here.refusal() == ""
+    assert not here.mine.has_ended
+    here.stops.give("other", (2,), "a test")
+    assert here.refusal() == ""
+    here.stops.give("other", (1,), "a test")
+    assert here.refusal() == "Not sent: drive 1 was stopped after it was armed."
+
+
+@pytest.mark.parametrize(("size", "known"), [(MOST_CARE, True), (MOST_CARE + 1, False), (0, False)])
+def test_lease_has_the_latest_stop_instructions_or_none(
+    size: int, known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Leases(monkeypatch)
+    here.leases.arm(1, 60.0, CARE)
+    del here.sent[:]
+    care = bytes(size)
+    here.leases.arm(1, 60.0, care)
+    assert here.mine.care == (care if known else b"")
+    assert (here.refusal() == "") == known
+    if not known:
+        assert "does not know how to stop drive 1" in here.refusal()
+    ended = [] if known else [Armed(1, 0, LEASE_ENDED, b"")]
+    assert here.sent == [*ended, Armed(1, 0, 1061.0, care if known else b"")]
+
+
+@pytest.mark.parametrize(("later", "until"), [(0.5, 1061.0), (1.0, 1062.0), (3.0, 1064.0)])
+def test_lease_is_extended_if_a_second_is_gained(
+    later: float, until: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Leases(monkeypatch)
+    here.leases.stay_armed(1, 60.0)
+    assert here.leases.of("me") == {}, "a drive that is not armed stays so"
+    here.leases.arm(1, 60.0, CARE)
+    del here.sent[:]
+    here.now += later
+    here.leases.stay_armed(1, None)
+    assert here.mine.until == 1061.0
+    here.leases.stay_armed(1, 60.0)
+    assert here.mine == WriteLease(0, until, CARE)
+    assert here.sent == ([Armed(1, 0, until, b"")] if until > 1061.0 else [])
+
+
+@pytest.mark.parametrize("ended", [True, False])
+def test_lease_that_is_not_limited_or_has_ended_is_not_extended(
+    ended: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Leases(monkeypatch)
+    here.leases.arm(1, 60.0 if ended else None, CARE)
+    if ended:
+        here.leases.disarm(1)
+    before = here.mine
+    here.now += 10.0
+    here.leases.stay_armed(1, 60.0)
+    assert here.mine == before
+
+
+def test_disarmed_drive_keeps_its_stop_instructions_until_others_command_it(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Leases(monkeypatch)
+    here.leases.disarm(1)
+    assert here.sent == []
+    for device in (1, 2):
+        here.leases.arm(device, 60.0, CARE)
+    here.stops.give("other", (1,), "a test")
+    del here.sent[:]
+    here.leases.disarm(1)
+    assert here.mine == WriteLease(0, LEASE_ENDED, CARE)
+    assert here.sent == [Armed(1, 1, LEASE_ENDED, b"")]
+    here.leases.disarm(1)
+    assert len(here.sent) == 1, "once is enough"
+    here.leases.forget_ended([1, 2, 3])
+    assert list(here.leases.of("me")) == [2], "the drive that is armed stays so"
+
+
+def test_leases_of_a_program_end_together_or_by_device(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Leases(monkeypatch)
+    for program in ("me", "other"):
+        for device in (1, 2):
+            here.leases.grant(program, device, WriteLease(0, None, CARE))
+    here.leases.end("me", 1)
+    assert (list(here.leases.of("me")), list(here.leases.of("other"))) == ([2], [1, 2])
+    here.leases.end("other")
+    assert (list(here.leases.of("me")), list(here.leases.of("other"))) == ([2], [])
+    granted = here.leases.grant("me", 2, WriteLease(3, 5.0))
+    assert granted == here.leases.of("me")[2] == WriteLease(3, 5.0, CARE)

@@ -52,7 +52,7 @@ from tui.bus.share.messages import (
 )
 from tui.bus.share.place import Owner
 from tui.bus.shared_state import SharedState
-from tui.bus.stop_counts import StopCounts
+from tui.bus.stop_counts import StopCounts, is_newer
 from tui.bus.trace import Frame
 
 from .conftest import Share
@@ -150,6 +150,87 @@ def test_stop_counts_by_name_stay_few() -> None:
         assert len(owner.given[1]) < MOST_STOPPERS
     assert owner.stamp(1) == 2000 + 1901
     assert owner.of("run", (1,)) == (1901,)
+
+
+class _Seconds:
+    """The time of stop counts, as a test sets it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 1000.0
+        monkeypatch.setattr("tui.bus.stop_counts.time", self)
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+def test_stop_is_noted_with_its_program_and_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    time, counts = _Seconds(monkeypatch), StopCounts()
+    counts.give("me", (1, 2), "the stop key")
+    assert (dict(counts.totals), dict(counts.by)) == (
+        {1: 1, 2: 1},
+        dict.fromkeys((1, 2), "the stop key"),
+    )
+    assert dict(counts.times) == {1: 1000.0, 2: 1000.0}
+    time.now += 5.0
+    assert counts.note("run", (2, 3), (0, 4), "run", 1002.0) == (3,), "no news of device 2"
+    assert dict(counts.times) == {1: 1000.0, 2: 1000.0, 3: 1002.0}
+    assert dict(counts.by) == {1: "the stop key", 2: "run", 3: "run"}
+    assert (counts.stamp(0), counts.stamp(3), counts.stamp(9)) == (6, 4, 0)
+    assert counts.of("run", (1, 2, 3)) == (0, 0, 4)
+    assert counts.plain == {1: {"me": 1}, 2: {"me": 1}, 3: {"run": 4}}
+
+
+def test_times_of_stops_only_advance_and_are_kept_for_ten_minutes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    time, counts = _Seconds(monkeypatch), StopCounts()
+    counts.learn_times({1: 990.0, 2: 1000.0, 3: 1000.1})
+    assert dict(counts.times) == {1: 990.0, 2: 1000.0}, "a future time is of another start"
+    counts.learn_times({1: 980.0, 2: 995.0})
+    assert dict(counts.times) == {1: 990.0, 2: 1000.0}
+    for time.now, late in ((1589.9, {1, 2}), (1590.0, {2}), (1600.0, set())):
+        assert counts.late_times.keys() == late
+
+
+def test_counts_of_the_owner_replace_all_but_those_of_this_program() -> None:
+    counts = StopCounts()
+    counts.learn({1: {"me": 3, "run": 5}, 2: {"run": 1}})
+    assert counts.replace({1: {"me": 1, "run": 6}, 2: {"run": 1}}, "me") == (1,)
+    assert counts.plain == {1: {"me": 3, "run": 6}, 2: {"run": 1}}
+    assert counts.replace({1: {"run": 6}, 4: {"run": 2}}, "me") == (4,)
+    assert counts.plain == {1: {"me": 3, "run": 6}, 4: {"run": 2}}
+
+
+@pytest.mark.parametrize(
+    ("count", "than", "newer"),
+    [
+        (1, 0, True),
+        (0, 0, False),
+        (0, 1, False),
+        (0, HIGHEST, True),
+        (HIGHEST, 0, False),
+        (STOPS_WRAP // 2 - 1, 0, True),
+        (STOPS_WRAP // 2, 0, False),
+    ],
+)
+def test_count_is_newer_by_less_than_half_of_all_counts(count: int, than: int, newer: bool) -> None:
+    assert is_newer(count, than) == newer
+
+
+def test_greeting_corrects_only_counts_that_are_too_high() -> None:
+    owner = StopCounts()
+    owner.learn({1: {"run": 5}, 2: {"run": 2}, 3: {"other": 4}})
+    greeting = {1: {"run": 3}, 2: {"run": 2, "gone": 7, "other": 9}}
+    assert set(owner.learn_greeting("run", greeting, ["run", "other"])) == {1, 2}
+    assert owner.plain == {1: {"run": 3, "": 2}, 2: {"run": 2, "gone": 7}, 3: {"other": 4}}
+
+
+def test_counts_of_programs_that_left_go_on_without_their_names() -> None:
+    owner = StopCounts()
+    owner.learn({1: {"a": 5, "b": 2, "": 1}, 2: {"c": 4}})
+    owner.fold({"a", "c"})
+    assert owner.plain == {1: {"b": 2, "": 6}, 2: {"": 4}}
+    assert dict(owner.totals) == {1: 8, 2: 4}
 
 
 # On a line

@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import threading
 from collections.abc import AsyncIterator, Callable, Coroutine
-from typing import Any
+from functools import partial
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -13,7 +16,7 @@ from tui.bus.api import LineStatus, LineWorker
 from tui.bus.errors import Superseded
 from tui.bus.fake import FakeLine
 from tui.drive.orders import OrderRefused
-from tui.session.arming import Arming, NotArmed
+from tui.session.arming import Arming, CommandedElsewhere, NotArmed
 from tui.session.work import (
     BY_STOP,
     MOST_WAITING,
@@ -426,3 +429,117 @@ async def test_stop_while_a_drive_is_armed_leaves_it_disarmed(
     notified.queue.arm(notified.queue.stops, 60.0)
     stop.join(20.0)
     assert not notified.arming.armed
+
+
+# -- arming, in time that the test sets ------------------------------------------------------------
+
+
+class Armed:
+    """Arming of device 1, with what the line hears of it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, device: int | None = 1) -> None:
+        self.now = 1000.0
+        self.line = FakeLine()
+        self.heard: list[tuple[object, ...]] = []
+        self.claimed = ""
+        facts = self.line.facts
+        monkeypatch.setattr(facts, "claim", self._claim)
+        monkeypatch.setattr(facts, "release", partial(self._hear, "release"))
+        for name in ("arm", "stay_armed", "disarm"):
+            monkeypatch.setattr(facts.leases, name, partial(self._hear, name))
+        clock = cast(Any, SimpleNamespace(monotonic=lambda: self.now))
+        self.arming = Arming(self.line, clock, device, lambda: b"care")
+
+    def _hear(self, *what: object) -> None:
+        self.heard.append(what)
+
+    def _claim(self, device: int) -> str:
+        self._hear("claim", device)
+        return self.claimed
+
+
+@pytest.mark.parametrize(("seconds", "lease"), [(60.0, 60.0), (5.0, 5.0), (math.inf, None)])
+def test_arming_lasts_for_its_time_and_each_key_restarts_it(
+    seconds: float, lease: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Armed(monkeypatch)
+    arming = here.arming
+    assert (arming.armed, arming.refusal()) == (False, "Not armed. Press a to arm this drive.")
+    arming.touch()
+    assert not arming.armed
+    assert here.heard == []
+    arming.arm(seconds=seconds)
+    assert here.heard == [("claim", 1), ("arm", 1, lease, b"care")]
+    assert (arming.armed_for, arming.times, arming.refusal()) == (seconds, 1, "")
+    here.now += 4.0
+    assert arming.armed_for == seconds - 4.0
+    arming.touch()
+    assert here.heard[2:] == [("stay_armed", 1, lease)]
+    assert arming.armed_for == seconds
+    here.now += 59.9
+    if seconds == 60.0:
+        assert arming.armed
+        here.now += 0.1
+    if lease is None:
+        assert arming.armed_for == math.inf
+        return
+    assert arming.armed_for is None
+    assert here.heard[3:] == [("release", 1), ("disarm", 1)]
+    assert arming.refusal() == arming.why_disarmed == "Disarmed: no key pressed for 60 s."
+    arming.arm()
+    assert (arming.times, arming.why_disarmed, arming.armed_for) == (2, "", 60.0)
+
+
+def test_line_or_drive_that_cannot_be_armed_says_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Armed(monkeypatch)
+    arming, line = here.arming, here.line
+    assert arming.hindrance == ""
+    arming.trouble = lambda: "trouble"
+    assert arming.hindrance == "trouble"
+    arming.barred = "barred"
+    assert arming.hindrance == "barred"
+    line.held = "held"
+    assert arming.hindrance == "held"
+    line.read_only = True
+    assert arming.hindrance == "The line is read-only: nothing is written."
+    with pytest.raises(OrderRefused, match="read-only"):
+        arming.arm()
+    assert (here.heard, arming.armed, arming.times) == ([], False, 0)
+
+
+def test_drive_that_another_program_commands_is_not_armed(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Armed(monkeypatch)
+    here.claimed = "A panel commands it."
+    with pytest.raises(CommandedElsewhere, match="A panel commands it"):
+        here.arming.arm()
+    assert (here.heard, here.arming.armed, here.arming.times) == ([("claim", 1)], False, 0)
+
+
+@pytest.mark.parametrize(
+    ("cause", "why"),
+    [
+        (lambda here: here.line.become(LineStatus.LOST), "The line was lost: no longer armed."),
+        (lambda here: setattr(here.line, "held", "held"), "held"),
+        (lambda here: setattr(here.arming, "trouble", lambda: "trouble"), "trouble"),
+        (lambda here: here.arming.disarm("a stop"), "a stop"),
+    ],
+)
+def test_arming_ends_with_its_reason(
+    cause: Callable[[Armed], object], why: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Armed(monkeypatch)
+    here.arming.arm()
+    cause(here)
+    assert not here.arming.armed
+    assert here.arming.refusal() == here.arming.why_disarmed == why
+    assert here.heard[2:] == [("release", 1), ("disarm", 1)]
+
+
+def test_arming_of_no_device_concerns_no_other_program(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Armed(monkeypatch, None)
+    here.arming.arm()
+    here.arming.touch()
+    assert here.arming.armed
+    here.arming.disarm()
+    assert here.heard == []
+    assert here.arming.refusal() == "Not armed. Press a to arm this drive."
