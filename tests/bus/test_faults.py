@@ -7,6 +7,7 @@ import time
 from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from typing import Any
 
 import pytest
 from pymodbus.pdu.pdu import ModbusPDU
@@ -19,8 +20,10 @@ from tui.bus.errors import (
     NoAnswer,
     WrongReply,
 )
-from tui.bus.line import Timing
+from tui.bus.line import Line, Timing
 from tui.bus.link import SerialLink, silence
+from tui.bus.model import Reply
+from tui.bus.requests import REFERENCE, Identify, ReportId, Request, own_words_of
 from tui.wire.frames import frame
 
 from .conftest import BRISK, PATIENT, OpenLine, sent
@@ -566,3 +569,46 @@ async def test_identification_without_end_is_refused(open_line: OpenLine) -> Non
         with pytest.raises(WrongReply, match="does not end"):
             await line.identify(1)
         assert len(peer.requests) == 1
+
+
+class Identified(Line):
+    """A line whose replies to identifications are given; it sends nothing."""
+
+    def __init__(self, *pdus: bytes) -> None:
+        self.sent: list[tuple[object, ...]] = []
+        self._pdus = list(pdus)
+
+    async def _ask(self, request: Request, priority: Priority, *_: Any, **more: Any) -> Reply:
+        self.sent.append((request, priority, more["within"]))
+        return Reply((), 0.0, self._pdus.pop(0))
+
+
+async def test_identification_is_requested_until_nothing_follows() -> None:
+    line = Identified(
+        bytes([43, 14, 1, 0x82, 0xFF, 1, 1, 0, 1]) + b"a",
+        bytes([43, 14, 1, 0x81, 0, 0, 1, 1, 1]) + b"b",
+    )
+    found = await line.identify(7, within=0.3)
+    assert (found.conformity, found.objects) == (0x81, {0: b"a", 1: b"b"})
+    read = Priority.OPERATOR_READ
+    assert line.sent == [(Identify(7), read, 0.3), (Identify(7, first_object=1), read, 0.3)]
+
+
+async def test_identification_that_contradicts_itself_names_its_device_and_function() -> None:
+    line = Identified(*TWICE_IN_TWO)
+    with pytest.raises(WrongReply) as caught:
+        await line.identify(7)
+    error = caught.value
+    assert (error.device, error.function, error.address, error.received) == (7, 43, 0, b"")
+    assert error.detail == "object 1 came with two contents, 'one' and 'two'"
+    assert str(error) == f"Device 7 sent an unexpected reply (function 43): {error.detail}."
+
+
+async def test_identification_by_function_17_is_one_object() -> None:
+    line = Identified(bytes([17, 3]) + b"ABC")
+    found = await line.identify(7, function=17, priority=Priority.BACKGROUND, within=0.5)
+    assert (found.conformity, found.objects) == (
+        0,
+        {REFERENCE: own_words_of(bytes([17, 3]) + b"ABC")},
+    )
+    assert line.sent == [(ReportId(7), Priority.BACKGROUND, 0.5)]

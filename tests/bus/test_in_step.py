@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
-from typing import cast
+from typing import Any, cast
 
 import pytest
 
@@ -662,3 +662,103 @@ def test_repeat_of_a_request_without_a_reply_is_sent_as_it_was() -> None:
     assert repeat.form is None
     line.steps.prepare(other)
     assert other.form is not None, "a late reply to the first one has its length"
+
+
+def test_new_connection_trusts_no_drive_and_forgets_requests_unless_it_is_behind() -> None:
+    fields = (
+        "_proved", "_weak", "_missed", "_shifts", "_tries", "_next_try", "_waited", "quiet_until",
+        "reopen",
+    )  # fmt: skip
+    for behind in ("", "Replies are one behind."):
+        line, new = _Line(), _Line()
+        steps = line.steps
+        steps._proved, steps._weak, steps._missed = {1}, {1}, {1: b"read"}
+        steps._shifts, steps._tries, steps._next_try, steps._waited = 3, 3, 3.0, 3.0
+        steps.quiet_until, steps.reopen, steps.behind = 3.0, True, behind
+        steps._probes.heard = True
+        steps._probes.sent(1).append(Read(1, 100, 1).expectation())
+        steps.opened()
+        for name in fields:
+            value = getattr(steps, name)
+            assert value == getattr(new.steps, name), name
+            assert not value, name
+        assert not steps._probes.heard
+        assert len(steps._probes.sent(1)) == (1 if behind else 0)
+
+
+class _Quiet(_Answers):
+    """A master that notes when it kept the line quiet."""
+
+    quiets = 0
+
+    async def quiet(self) -> None:
+        self.quiets += 1
+
+
+def _behind(kind: ResultKind, witness: Job) -> tuple[_Line, Master, InStep]:
+    line = _Line()
+    steps = line.steps
+    steps.behind, steps._witness = "Replies are one behind.", witness
+    return line, cast(Master, _Quiet(kind)), steps
+
+
+@pytest.mark.parametrize(
+    ("kind", "recovers"),
+    [
+        (ResultKind.REPLY, True),
+        (ResultKind.NOTHING, False),
+        (ResultKind.EXCEPTION, False),
+    ],
+)
+async def test_line_that_is_behind_is_checked_by_two_requests(
+    kind: ResultKind, recovers: bool
+) -> None:
+    line, master, steps = _behind(kind, poll(2))
+    line.steps._probes.sent(1).append(Read(1, 100, 2).expectation())
+    steps._shifts = 1
+    steps._next_try = 3.0
+    assert await steps.attend(master) == 2.0
+    assert cast(Any, master).quiets == 0
+    line.now = 3.0
+    assert await steps.attend(master) == 0.0
+    assert cast(Any, master).quiets == 1
+    assert bool(steps.behind) == (not recovers)
+    if recovers:
+        return
+    assert (steps._tries, steps._rounds) == (1, 0)
+    steps._next_try = 0.0
+    assert await steps.attend(master) == 0.0
+    assert (steps._tries, steps._rounds) == (2, 1)
+    assert steps._next_try == 3.0 + Timing().first_timeout
+    assert steps.behind, "an earlier reply came last"
+    assert not steps.reopen
+    line.now = steps._next_try
+    assert await steps.attend(master) == 0.0
+    assert steps.reopen
+    assert cast(Any, master).quiets == 2
+
+
+async def test_line_without_any_further_sign_is_in_step_and_is_checked_seldom_later() -> None:
+    line, master, steps = _behind(ResultKind.EXCEPTION, poll(2))
+    steps._tries, steps._rounds = 1, 2
+    await steps.attend(master)
+    assert steps.behind == ""
+    assert steps._next_try == line.now + 10.0
+
+
+async def test_line_with_one_form_waits_until_a_probe_is_unlike_late_replies() -> None:
+    line, master, steps = _behind(ResultKind.REPLY, poll(1, replace(FEW, max_read=1)))
+    read = Read(1, 100, 1).expectation()
+    for register in (100, 101):
+        steps._probes.sent(1).append(Read(1, register, 1).expectation())
+    waits = 0
+    while (seconds := await steps.attend(master)) > 0.0:
+        assert seconds == 0.2
+        waits += 1
+        assert waits < 100
+    assert waits in (50, 51), "ten seconds"
+    assert cast(Any, master).quiets == 0
+    assert steps._tries == 2
+    assert steps.behind, "nothing was sent that could prove it"
+    assert read in steps._probes.sent(1)
+    assert line.steps._rounds == 1
