@@ -549,14 +549,164 @@ def test_proof_ends_every_suspicion_and_reports_a_line_that_was_behind_once() ->
     line = _Line()
     steps, recovered = line.steps, []
     steps.recovered = lambda: recovered.append(steps.behind)
-    for behind, times in (("", 0), ("Replies are one behind.", 1), ("", 1)):
+    line.note(poll(1), ResultKind.REPLY)
+    for count, behind in ((2, ""), (3, "Replies are one behind."), (4, "")):
         steps.behind, steps._shifts, steps.quiet_until = behind, 1, 5.0
-        line.note(poll(1), ResultKind.REPLY)
-        line.note(poll(2 + times), ResultKind.NOTHING)
-        line.note(poll(4 + len(recovered)), ResultKind.REPLY)
-        steps._fall_in()
+        line.note(poll(count), ResultKind.REPLY)
         assert (steps.behind, steps._shifts, steps.quiet_until) == ("", 0, 0.0)
-        assert recovered == [""] * times
+        assert recovered == ([] if count == 2 else [""])
+
+
+def test_only_replies_that_no_adapter_can_make_are_heard() -> None:
+    line = _Line()
+    probes = line.steps._probes
+    line.note(poll(1), ResultKind.EXCEPTION)
+    echo = Diagnose(1, 0, 77).expectation()
+    line.steps.note(poll(1), echo, ExchangeResult(ResultKind.REPLY, sent=1.0), number=True)
+    assert not probes.heard
+    line.note(poll(1), ResultKind.REPLY)
+    assert probes.heard
+    line.note(poll(1), ResultKind.NOTHING)
+    assert probes.heard
+
+
+@pytest.mark.parametrize("gateway", [True, False])
+def test_request_without_a_reply_is_remembered_until_the_next_one(gateway: bool) -> None:
+    line = _Line(gateway=gateway)
+    steps, other = line.steps, poll(3, device=2)
+    line.note(poll(1), ResultKind.NOTHING)
+    assert steps._missed == {1: poll(1).pdu}
+    probe = ExchangeResult(ResultKind.NOTHING, sent=1.0)
+    steps.note(other, Read(2, 100, 4).expectation(), probe)
+    assert steps._missed == ({} if gateway else {1: poll(1).pdu}), "a probe is not the request"
+    line.note(other, ResultKind.DAMAGED)
+    assert 2 not in steps._missed
+    line.note(poll(2), ResultKind.REPLY)
+    assert steps._missed == {}
+
+
+def test_drive_that_answers_short_reads_only_is_sent_no_longer_ones() -> None:
+    line = _Line()
+    noted: list[object] = []
+    probes = line.steps._probes
+    probes.forms.note_silence = noted.append  # type: ignore[assignment,method-assign]
+    for kind, silences in ((ResultKind.EXCEPTION, 0), (ResultKind.REPLY, 1), (ResultKind.REPLY, 1)):
+        if silences == len(noted):
+            probes.silent.add(2)
+        if kind is ResultKind.REPLY and not noted:
+            probes.silent.add(1)
+        line.note(poll(1), kind)
+        assert noted == [1] * silences
+        assert 1 not in probes.silent
+
+
+def test_stray_frame_of_another_drive_ends_the_proof_of_that_drive() -> None:
+    line = _Line()
+    line.steps._proved |= {1, 2, 3}
+    line.note(poll(1), ResultKind.REPLY, reply(bytes([2]) + poll().pdu + bytes(2)))
+    assert line.steps._proved == {1, 3}
+
+
+@pytest.mark.parametrize(("code", "earlier"), [(0x83, True), (0x86, False)])
+def test_refusal_of_an_earlier_function_may_be_an_earlier_reply(code: int, earlier: bool) -> None:
+    line = _Line()
+    line.note(poll(1), ResultKind.REPLY)
+    piece = Piece(frame(1, bytes([code, 2])), whole=True)
+    assert line.steps._is_earlier(piece) == earlier
+    assert line.steps._is_earlier(Piece(reply(bytes([1]) + poll().pdu + bytes(2)), whole=True))
+    assert not line.steps._is_earlier(Piece(reply(bytes([1]) + poll(2).pdu + bytes(2)), whole=True))
+
+
+def test_line_is_behind_if_the_request_after_the_drain_was_sent_after_it() -> None:
+    line = _Line()
+    steps = line.steps
+    earlier = reply(bytes([1]) + poll(1).pdu + bytes(2))
+    line.note(poll(1), ResultKind.NOTHING)
+    steps._shifts, steps.quiet_until = 1, 5.0
+    for sent, ended, behind in ((4.9, 5.2, False), (5.0, 5.2, True)):
+        line.now = ended
+        pieces = [Piece(earlier, whole=True)]
+        result = ExchangeResult(ResultKind.WRONG, sent=sent, strays=pieces)
+        steps.note(poll(2), Read(1, 100, 2).expectation(), result)
+        assert bool(steps.behind) == behind
+
+
+def test_write_whose_reply_is_like_the_last_one_is_preceded_by_another_form() -> None:
+    line = _Line()
+    write = Job(WriteOne(1, 7, 7), Priority.OPERATOR_WRITE, FEW)
+    for job in (poll(limits=FEW), write):
+        line.note(job, ResultKind.NOTHING)
+    line.devices[1].outstanding.clear()
+    again = Job(WriteOne(1, 7, 7), Priority.OPERATOR_WRITE, FEW)
+    assert line.steps.prepare(again) == Read(1, 7, 1), "unlike the last one at least"
+    assert again.probes == 1
+    line.note(poll(limits=FEW), ResultKind.NOTHING)
+    assert line.steps.prepare(again) is None, "the write itself is unlike the last one"
+    assert again.probes == 2
+    again.probes = 4
+    line.steps._weak.clear()
+    assert line.steps.prepare(again) is None
+    assert (again.probes, line.steps._weak) == (4, set())
+
+
+class _Sent(_Answers):
+    """A master that keeps what it was given; without an answer, the line is lost."""
+
+    def __init__(self, kind: ResultKind | None, line: _Line) -> None:
+        super().__init__(kind or ResultKind.NOTHING)
+        self._result.sent, self._result.turnaround, self._result.end = 1.25, 0.125, 1.5
+        self.lost, self.line = kind is None, line
+        self.sent: list[Sending] = []
+
+    async def exchange(self, sending: Sending) -> ExchangeResult:
+        self.sent.append(sending)
+        self.line.now += 0.5
+        if self.lost:
+            raise LineLost("unplugged")
+        return self._result
+
+
+@pytest.mark.parametrize("kind", [*ResultKind, None])
+async def test_probe_is_sent_like_its_job_and_its_end_is_noted(kind: ResultKind | None) -> None:
+    line = _Line()
+    counted: list[int] = []
+    strays: list[float] = []
+    late: list[tuple[object, ...]] = []
+    line.outcomes.count_beside = (  # type: ignore[method-assign]
+        lambda device, result: counted.append(device)
+    )
+    line.outcomes.note_strays = lambda _, end: strays.append(end) or set()  # type: ignore
+    line.devices.may_come = lambda *those: late.append(those)  # type: ignore
+    job = Job(Read(1, 100, 1), Priority.BACKGROUND, SILENT)
+    probe = Read(1, 100, 2)
+    seconds = line.devices.time_out(1, 3, Priority.BACKGROUND, None)
+    master = _Sent(kind, line)
+    if kind is None:
+        with pytest.raises(LineLost):
+            await line.steps.prove(cast(Master, master), job, probe)
+        assert late == [(1, probe.expectation(), 1.0, 1.5)]
+        assert line.steps._missed == {}
+        return
+    result = await line.steps.prove(cast(Master, master), job, probe)
+    (sending,) = master.sent
+    assert (sending.device, sending.pdu) == (1, probe.pdu())
+    assert (sending.expectation, sending.time_out) == (probe.expectation(), seconds)
+    answered = kind in (ResultKind.REPLY, ResultKind.EXCEPTION)
+    assert result.kind is kind
+    assert (counted, strays) == (([1], [1.5]) if answered else ([], []))
+    unanswered = kind in (ResultKind.NOTHING, ResultKind.DAMAGED, ResultKind.WRONG)
+    assert late == ([(1, probe.expectation(), 1.25, 1.5)] if unanswered else [])
+    record = line.devices[1]
+    assert (record.ever_answered, record.refused) == (answered, kind is ResultKind.EXCEPTION)
+    assert (record.heard == 1.5) == answered
+    assert (1 in line.steps._probes.silent) == (kind is ResultKind.NOTHING)
+
+
+async def test_silence_to_an_echo_is_not_one_to_a_longer_read() -> None:
+    line = _Line()
+    job = Job(Read(1, 100, 1), Priority.POLL, SILENT)
+    await line.steps.prove(cast(Master, _Sent(ResultKind.NOTHING, line)), job, Diagnose(1, 0, 7))
+    assert line.steps._probes.silent == set()
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Shares of the line's time under overload; by the clock of the test."""
+"""Shares of the line's time under overload, and each step of a request; in time of the tests."""
 
 from __future__ import annotations
 
@@ -6,14 +6,17 @@ import asyncio
 import math
 from collections import Counter
 from collections.abc import Callable
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from tui.bus.api import Priority, Reply
 from tui.bus.errors import OUTCOME_UNKNOWN, LineClosed, LineFailed, LineLost, RequestRefused
+from tui.bus.limits import Limits
 from tui.bus.line import Timing
-from tui.bus.master import ExchangeResult, ResultKind, Sending
-from tui.bus.requests import Read, WriteOne
+from tui.bus.master import ExchangeResult, Master, Piece, ResultKind, Sending
+from tui.bus.requests import Diagnose, Read, Request, WriteOne
 from tui.bus.schedule.dispatcher import Dispatcher
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import MINIMUM_SHARES, Job
@@ -354,3 +357,352 @@ async def test_internal_error_during_an_exchange_fails_its_request(
     assert isinstance(error, LineFailed)
     assert str(error).startswith("The request failed: ZeroDivisionError('on purpose').")
     assert str(error).endswith(OUTCOME_UNKNOWN) is unknown
+
+
+# -- one request, with each part of the dispatcher set by the test ---------------------------------
+
+
+class Parts:
+    """A dispatcher at 100 s; its master gives `results` in their order."""
+
+    echo: bool | None = None
+
+    def __init__(self, *results: ExchangeResult | Exception) -> None:
+        self.now = 100.0
+        self.results = list(results)
+        self.sent: list[Sending] = []
+        self.quiets = 0
+        timing = Timing(probes=False)
+        self.devices = Devices(timing, mistakable=True)
+        self.here = Dispatcher(self.devices, Tally(), timing, lambda: self.now, gateway=False)
+        self.late: list[tuple[Any, ...]] = []
+        self.devices.may_come = lambda *those: self.late.append(those)  # type: ignore[method-assign]
+
+    @property
+    def master(self) -> Master:
+        return cast(Master, self)
+
+    async def quiet(self) -> None:
+        self.quiets += 1
+
+    async def exchange(self, sending: Sending) -> ExchangeResult:
+        self.sent.append(sending)
+        sending.look()
+        self.now += 0.25
+        result = self.results.pop(0)
+        if isinstance(result, Exception):
+            raise result
+        return result
+
+
+VALUE = bytes([3, 2, 0, 7])
+
+
+def job_of(
+    priority: Priority = Priority.POLL, request: Request | None = None, limits: Limits = WIDE
+) -> Job:
+    return Job(request or Read(1, 100, 1), priority, limits, program="a")
+
+
+def replied(pdu: bytes = VALUE) -> ExchangeResult:
+    return ExchangeResult(ResultKind.REPLY, pdu, sent=100.1, end=100.25, turnaround=0.05)
+
+
+def test_request_waits_for_the_first_of_its_reasons() -> None:
+    parts = Parts()
+    here, job, stop = parts.here, job_of(), job_of(Priority.STOP, WriteOne(1, COMMAND, STOP_WORD))
+    longer: list[int] = []
+    forms = [False]
+
+    def lengthen(_: Job) -> bool:
+        longer.append(1)
+        if forms[0]:
+            free.insert(0, 50.0)
+        return forms[0]
+
+    steps = SimpleNamespace(not_before=lambda *_: None, lengthen=lengthen)
+    cast(Any, here).steps = steps
+    cast(Any, here).proof = proof = SimpleNamespace(not_before=lambda *_: 0.0)
+    back = SimpleNamespace(not_before=lambda _: 0.0)
+    cast(Any, here)._back_to_back = back
+    free = [99.0]
+    devices = cast(Any, parts.devices)
+    devices.not_before = lambda *_: free[0]
+    devices.backed_off = lambda *_: None
+    assert here._not_before(job) == 99.0
+    free[0] = 100.0
+    assert (here._not_before(job), longer) == (100.0, [])
+    free[0] = 103.0
+    devices.quiet_until = 103.0
+    assert (here._not_before(job), longer) == (103.0, [])
+    devices.quiet_until = 102.0
+    assert (here._not_before(job), longer) == (103.0, [1])
+    forms[0] = True
+    assert here._not_before(job) == 50.0, "lengthened, it need not wait"
+    devices.backed_off = lambda *_: 1.0
+    assert here._not_before(job) == 0.0, "to fail at once"
+    back.not_before = lambda _: 104.0
+    assert here._not_before(job) == 104.0
+    proof.not_before = lambda *_: 105.0
+    assert here._not_before(job) == 105.0
+    proof.not_before = lambda *_: 100.0
+    assert here._not_before(job) == 104.0
+    steps.not_before = lambda *_: 3.0
+    assert here._not_before(job) == 3.0
+    here.held_back = lambda: True
+    assert here._not_before(job) == 100.01
+    assert here._not_before(stop) == 3.0, "no program holds a stop back"
+
+
+def test_dispatcher_looks_again_after_each_change() -> None:
+    parts = Parts()
+    here = parts.here
+
+    def woken() -> bool:
+        found = here._wake.is_set()
+        here._wake.clear()
+        return found
+
+    assert not woken()
+    job = job_of()
+    here.submit(job)
+    assert woken()
+    assert here.take_all() == [job]
+    here.put_back(job)
+    assert woken()
+    assert here.take_all() == [job]
+    strays: list[object] = []
+    cast(Any, here)._outcomes = SimpleNamespace(note_stray=lambda *those: strays.append(those))
+    cast(Any, here).steps = SimpleNamespace(stray=strays.append)
+    piece = Piece(b"a frame", whole=True)
+    here.stray(piece, 99.0)
+    assert woken()
+    assert strays == [(piece, 99.0), piece]
+    here.wake()
+    assert woken()
+
+
+def test_waiting_requests_fail_with_the_line_and_a_stop_is_kept_while_it_is_behind() -> None:
+    for behind, kind, kept in (
+        ("", LineLost, 0),
+        ("behind", LineLost, 1),
+        ("behind", LineClosed, 0),
+    ):
+        here = Parts().here
+        poll, stop = job_of(), job_of(Priority.STOP, WriteOne(1, COMMAND, STOP_WORD))
+        stop.requested = 100.0
+        for job in (poll, stop):
+            here.submit(job)
+        here.steps.behind = behind
+        here.fail_all("unplugged", kind)
+        for job in (poll, stop):
+            assert isinstance(job.answer.exception(0), kind)
+        assert [again.request for again in here.take_all()] == [stop.request] * kept
+
+
+def test_old_commands_are_refused_and_neither_stops_nor_reads() -> None:
+    here = Parts().here
+    jobs = [
+        job_of(Priority.OPERATOR_WRITE, WriteOne(1, COMMAND, RUN_WORD)),
+        job_of(Priority.OPERATOR_WRITE, WriteOne(2, COMMAND, RUN_WORD)),
+        job_of(Priority.STOP, WriteOne(3, COMMAND, STOP_WORD)), job_of(),
+    ]  # fmt: skip
+    for job, requested in zip(jobs, (98.9, 99.0, 90.0, 90.0), strict=True):
+        job.requested = requested
+        here.submit(job)
+    here.void_older(99.0, "a stop came")
+    with pytest.raises(RequestRefused, match="a stop came"):
+        jobs[0].answer.result(0)
+    assert here.take_all() == jobs[1:]
+    here.submit(jobs[1])
+    here.facts.give_stop([2], "the stop key")
+    here.void()
+    assert here.take_all() == []
+
+
+async def test_new_connection_is_begun_before_anything_is_sent() -> None:
+    parts = Parts()
+    here = parts.here
+    opened: list[int] = []
+    here.steps.opened = lambda: opened.append(len(parts.sent))  # type: ignore[method-assign]
+    here.submit(job_of())
+    cast(Any, parts).failure = OSError("unplugged")
+    with pytest.raises(LineLost, match="unplugged"):
+        await here.serve(parts.master)
+    assert (opened, parts.sent) == ([0], [])
+
+
+async def test_request_is_begun_once_and_a_withdrawn_one_is_not_sent() -> None:
+    parts = Parts(replied(), replied())
+    withdrawn, job = job_of(), job_of()
+    withdrawn.answer.cancel()
+    await parts.here._run(parts.master, withdrawn)
+    assert parts.sent == []
+    await parts.here._run(parts.master, job)
+    assert job.begun
+    assert job.answer.result(0).words == (7,)
+    again = job_of()
+    again.begun = again.answer.set_running_or_notify_cancel()
+    await parts.here._run(parts.master, again)
+    assert again.answer.result(0).words == (7,), "it was begun, and is sent again"
+
+
+@pytest.mark.parametrize(("word", "dropped"), [(RUN_WORD, [1]), (None, [])])
+async def test_write_makes_shared_values_of_its_drive_unknown(
+    word: int | None, dropped: list[int]
+) -> None:
+    request = Read(1, COMMAND, 1) if word is None else WriteOne(1, COMMAND, word)
+    job = job_of(Priority.STOP, request)
+    parts = Parts(replied(VALUE if word is None else job.pdu))
+    drops: list[int] = []
+    cast(Any, parts.here._outcomes.values).drop = drops.append
+    await parts.here._run(parts.master, job)
+    assert drops == dropped
+
+
+async def test_request_on_a_lost_line_waits_for_the_state_of_the_line() -> None:
+    job = job_of()
+    parts = Parts(LineLost("unplugged"))
+    with pytest.raises(LineLost):
+        await parts.here._run(parts.master, job)
+    assert not parts.here.in_flight
+    assert parts.here.take_all() == [job]
+    assert not job.answer.done()
+    assert parts.late == [(1, job.expectation, 100.0, 100.25)]
+
+
+@pytest.mark.parametrize(
+    ("echo", "limits", "probed", "kind"),
+    [
+        (False, WIDE, True, ResultKind.REPLY), (True, WIDE, True, ResultKind.NOTHING),
+        (None, WIDE, True, ResultKind.NOTHING),
+        (False, Limits(functions=frozenset({6}), max_read=0, max_write=1, max_read_23=0,
+                       max_write_23=0), False, ResultKind.REPLY),
+    ],
+)  # fmt: skip
+async def test_one_copy_of_a_write_is_its_reply_if_the_adapter_has_no_echo(
+    echo: bool | None, limits: Limits, probed: bool, kind: ResultKind
+) -> None:
+    parts = Parts(replied())
+    parts.echo = echo
+    job = job_of(Priority.STOP, WriteOne(1, COMMAND, STOP_WORD), limits)
+    unsure = ExchangeResult(ResultKind.UNSURE)
+    counted: list[int] = []
+    parts.here._outcomes.count_beside = (  # type: ignore[method-assign]
+        lambda device, result: counted.append(device)
+    )
+    await parts.here._resolve_echo(parts.master, job, unsure)
+    assert unsure.kind is kind
+    assert (unsure.pdu, unsure.detail) == (
+        (job.pdu, "") if kind is ResultKind.REPLY
+        else (b"", "only the adapter's echo of it came back")
+    )  # fmt: skip
+    assert counted == [1] * probed
+    assert parts.quiets == probed
+    if probed:
+        (sending,) = parts.sent
+        probe = Read(1, COMMAND, 1)
+        assert (sending.device, sending.pdu, sending.expectation) == (
+            1, probe.pdu(), probe.expectation()
+        )  # fmt: skip
+        assert sending.time_out == parts.devices.time_out(1, 3, Priority.STOP)
+
+
+@pytest.mark.parametrize("second", [VALUE, bytes([3, 2, 0, 8])])
+async def test_reply_that_may_be_a_copy_is_requested_once_more(second: bytes) -> None:
+    parts, job = Parts(replied(second)), job_of()
+    doubted = replied()
+    counted: list[object] = []
+    strays: list[float] = []
+    parts.here._outcomes.count_beside = (  # type: ignore[method-assign]
+        lambda device, result: counted.append((device, result))
+    )
+
+    def note_strays(_: object, end: float) -> set[int]:
+        strays.append(end)
+        return set()
+
+    cast(Any, parts.here._outcomes).note_strays = note_strays
+    result = await parts.here._ask_again(parts.master, job, doubted)
+    assert result.pdu == second
+    assert (parts.quiets, counted, strays) == (1, [(1, doubted)], [100.25])
+    assert parts.late == ([] if second == VALUE else [(1, job.expectation, 100.1, 100.25)])
+
+
+@pytest.mark.parametrize(
+    ("kind", "waits", "ended"),
+    [
+        (ResultKind.NOTHING, True, True), (ResultKind.WRONG, True, True),
+        (ResultKind.NOTHING, False, False), (ResultKind.REPLY, True, False),
+        (ResultKind.EXCEPTION, True, False),
+    ],
+)  # fmt: skip
+async def test_request_whose_probe_has_no_reply_has_none_either(
+    kind: ResultKind, waits: bool, ended: bool
+) -> None:
+    parts = Parts(ExchangeResult(kind, sent=100.1, end=100.2))
+    here, job = parts.here, job_of(Priority.OPERATOR_WRITE, WriteOne(1, COMMAND, RUN_WORD))
+    job.repeats = 99
+    if waits:
+        here.put_back(job)
+    flights: list[bool] = []
+    prove = here.steps.prove
+
+    async def proved(*those: Any) -> ExchangeResult:
+        flights.append(here.in_flight)
+        return await prove(*those)
+
+    cast(Any, here.steps).prove = proved
+    await here._prove(parts.master, job, Diagnose(1, 0, 7))
+    assert (flights, here.in_flight) == ([True], False)
+    assert here.take_all() == ([job] if waits and not ended else [])
+    assert job.answer.done() == ended
+    if ended:
+        assert "Nothing was written" in str(job.answer.exception(0))
+
+
+@pytest.mark.parametrize(
+    ("missed", "kind"),
+    [
+        (True, ResultKind.NOTHING),
+        (False, ResultKind.DAMAGED),
+    ],
+)
+def test_repeated_poll_lets_others_pass_if_its_drive_is_silent(
+    missed: bool, kind: ResultKind
+) -> None:
+    here = Parts().here
+    first, second = job_of(), job_of(request=Read(2, 100, 1))
+    for job in (first, second):
+        here.submit(job)
+    here._queue.remove(first)
+    here._repeat(first, ExchangeResult(kind))
+    taken, _ = here._queue.take(lambda _: 0.0, 100.0)
+    assert taken is (second if missed else first)
+    reading = job_of(Priority.OPERATOR_READ)
+    reading.order = -1
+    here._repeat(reading, ExchangeResult(ResultKind.NOTHING))
+    assert reading.order == -1, "only a poll gives up its place"
+
+
+def test_request_is_sent_with_what_is_known_of_its_drive() -> None:
+    parts = Parts()
+    here, job = parts.here, job_of(request=WriteOne(1, COMMAND, RUN_WORD))
+    cast(Any, parts.devices).doubts = lambda *those: (True, 3)
+    found = here._sending(job)
+    assert (found.device, found.pdu, found.expectation) == (1, job.pdu, job.expectation)
+    assert (found.sure, found.skip) == (True, 3)
+    assert found.time_out == parts.devices.time_out(1, 6, Priority.POLL, None)
+    here.proof.doubt(101.0)
+    assert not here._sending(job).sure, "a refusal may be another's"
+    read = job_of()
+    read.take_form(Read(1, 100, 2))
+    assert here._sending(read).sure, "its form is its own"
+    job.within = 0.07
+    assert here._sending(job).time_out == 0.07
+    broadcast = here._sending(job_of(request=WriteOne(0, COMMAND, 0)))
+    assert (broadcast.device, broadcast.expectation, broadcast.time_out) == (0, None, 0.0)
+    found.look()
+    here.facts.give_stop([1], "the stop key")
+    with pytest.raises(Exception, match="a stop came after it"):
+        found.look()

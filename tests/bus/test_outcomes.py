@@ -2,17 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import pytest
 
-from tui.bus.limits import CAUTIOUS
-from tui.bus.master import ExchangeResult, ResultKind
-from tui.bus.model import Priority, Timing
-from tui.bus.requests import Read
-from tui.bus.schedule.outcomes import Outcomes
+from tui.bus.errors import (
+    OUTCOME_UNKNOWN,
+    ChecksumFault,
+    DeviceException,
+    ExchangeError,
+    NoAnswer,
+    WrongReply,
+)
+from tui.bus.limits import CAUTIOUS, STANDARD_EXCEPTIONS
+from tui.bus.master import ExchangeResult, Piece, ResultKind
+from tui.bus.model import Priority, Reply, Timing
+from tui.bus.requests import Read, Request, WriteOne
+from tui.bus.schedule.outcomes import Next, Outcomes
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
+
+from .conftest import WIDE
+from .peer import reply
 
 
 @pytest.mark.parametrize(
@@ -50,3 +64,238 @@ def test_not_polled_silent_and_refused_are_distinct_states() -> None:
     assert copied.state(1).contact == "refused"
     devices.answered(1, expected, 0.01, 3.0)
     assert devices.state(1).contact == "answers"
+
+
+# -- each end of a request -------------------------------------------------------------------------
+
+VALUE = bytes([3, 2, 0, 77])
+
+
+class Ends:
+    """Ends of requests at a time that the test sets; device 1 has answered before if `known`."""
+
+    def __init__(self, *, known: bool = True, gateway: bool = False, retries: int = 2) -> None:
+        self.now = 10.0
+        self.timing = Timing(retries=retries)
+        self.devices, self.tally = Devices(self.timing, mistakable=True), Tally()
+        self.facts = SharedState()
+        self.outcomes = Outcomes(
+            self.devices, self.tally, self.timing, lambda: self.now, self.facts, gateway=gateway
+        )
+        if known:
+            self.devices.answered(1, Read(1, 0, 1).expectation(), 0.005, 9.0)
+        self.late: list[tuple[Any, ...]] = []
+        self.devices.may_come = lambda *those: self.late.append(those)  # type: ignore[method-assign]
+
+    def end(self, job: Job, kind: ResultKind, *, unsent: bool = False, **more: Any) -> Reply | Next:
+        result = ExchangeResult(kind, sent=9.5, end=9.75, turnaround=0.125, **more)
+        return self.outcomes.conclude(job, result, unsent=unsent)
+
+
+def read(priority: Priority = Priority.OPERATOR_READ, **more: Any) -> Job:
+    return Job(Read(1, 100, 1), priority, WIDE, **more)
+
+
+def command() -> Job:
+    return Job(WriteOne(1, 8501, 15), Priority.OPERATOR_WRITE, WIDE)
+
+
+def error_of(job: Job) -> ExchangeError:
+    found = job.answer.exception(0)
+    assert isinstance(found, ExchangeError)
+    return found
+
+
+def test_reply_has_its_words_and_the_time_of_its_end_or_of_the_first_try() -> None:
+    ends = Ends()
+    found = ends.end(read(), ResultKind.REPLY, pdu=VALUE)
+    assert found == Reply((77,), 9.75, VALUE)
+    for first, time in ((9.0, 9.0), (9.9, 9.75)):
+        again = ends.end(read(first_sent=first), ResultKind.REPLY, pdu=VALUE)
+        assert isinstance(again, Reply)
+        assert again.time == time
+
+
+@pytest.mark.parametrize(
+    ("max_age", "programs", "kept"), [(0.0, 1, False), (1.0, 1, True), (0.0, 2, True)]
+)
+def test_words_are_kept_while_another_reader_may_use_them(
+    max_age: float, programs: int, kept: bool
+) -> None:
+    ends = Ends()
+    ends.facts.programs = ("program",) * programs  # type: ignore[assignment]
+    ends.end(read(max_age=max_age), ResultKind.REPLY, pdu=VALUE)
+    assert (ends.outcomes.values.find(Read(1, 100, 1), 9.75) is not None) == kept
+
+
+@pytest.mark.parametrize(
+    ("code", "meanings", "text"),
+    [
+        (2, {}, STANDARD_EXCEPTIONS[2]),
+        (2, {2: "its own meaning"}, "its own meaning"),
+        (99, {}, ""),
+    ],
+)
+def test_refusal_is_not_repeated_and_has_the_meaning_of_its_family(
+    code: int, meanings: dict[int, str], text: str
+) -> None:
+    ends = Ends()
+    job = Job(Read(1, 100, 1), Priority.POLL, replace(WIDE, exceptions=meanings))
+    assert ends.end(job, ResultKind.EXCEPTION, exception=code) is Next.NOTHING
+    error = error_of(job)
+    assert isinstance(error, DeviceException)
+    assert (error.device, error.function, error.address, error.code) == (1, 3, 100, code)
+    assert text in str(error)
+    assert ends.devices[1].refused
+
+
+@pytest.mark.parametrize(
+    ("kind", "error", "text"),
+    [
+        (ResultKind.NOTHING, NoAnswer, "Device 1 did not answer (function 3, register 100)."),
+        (
+            ResultKind.WRONG,
+            WrongReply,
+            "Device 1 sent an unexpected reply (function 3, register 100).",
+        ),
+        (ResultKind.DAMAGED, ChecksumFault, ""),
+    ],
+)
+def test_request_that_failed_has_its_error(
+    kind: ResultKind, error: type[ExchangeError], text: str
+) -> None:
+    ends = Ends(retries=0)
+    job = read()
+    assert ends.end(job, kind, received=b"what came") is Next.NOTHING
+    found = error_of(job)
+    assert type(found) is error
+    assert (found.device, found.function, found.address) == (1, 3, 100)
+    assert text in str(found)
+    assert not str(found).endswith(OUTCOME_UNKNOWN)
+    if isinstance(found, (WrongReply, ChecksumFault)):
+        assert found.received == b"what came"
+
+
+def test_write_without_a_reply_is_not_repeated_and_may_have_taken_effect() -> None:
+    for kind in (ResultKind.NOTHING, ResultKind.WRONG, ResultKind.DAMAGED):
+        ends, job = Ends(), command()
+        assert ends.end(job, kind) is Next.NOTHING
+        assert job.repeats == 0
+        if kind is ResultKind.NOTHING:
+            assert str(error_of(job)) == (
+                f"Device 1 did not answer (function 6, register 8501).{OUTCOME_UNKNOWN}"
+            )
+
+
+def test_silence_of_a_gateway_has_its_detail() -> None:
+    ends, job = Ends(retries=0, gateway=True), read()
+    result = ExchangeResult(ResultKind.EXCEPTION, exception=11, sent=9.5, end=9.75)
+    ends.outcomes.hear_gateway(job, result)
+    assert result.kind is ResultKind.NOTHING
+    assert ends.outcomes.conclude(job, result) is Next.NOTHING
+    assert str(error_of(job)) == (
+        "Device 1 did not answer (function 3, register 100): the gateway heard nothing of it."
+    )
+
+
+@pytest.mark.parametrize(
+    ("gateway", "code", "meanings", "silent"),
+    [
+        (True, 10, STANDARD_EXCEPTIONS, True), (True, 11, {}, True), (True, 4, {}, False),
+        (False, 11, {}, False), (True, 11, {11: "own"}, False), (True, 11, {10: "own"}, True),
+    ],
+)  # fmt: skip
+def test_exception_of_a_gateway_is_a_silence_unless_the_drive_has_it_too(
+    gateway: bool, code: int, meanings: Any, silent: bool
+) -> None:
+    ends = Ends(gateway=gateway)
+    job = Job(Read(1, 100, 1), Priority.POLL, replace(WIDE, exceptions=meanings))
+    result = ExchangeResult(ResultKind.EXCEPTION, exception=code)
+    ends.outcomes.hear_gateway(job, result)
+    assert (result.kind is ResultKind.NOTHING) == silent
+
+
+@pytest.mark.parametrize(
+    ("kind", "priority", "known", "times"),
+    [
+        (ResultKind.NOTHING, Priority.OPERATOR_READ, True, 1),
+        (ResultKind.NOTHING, Priority.OPERATOR_READ, False, 0),
+        (ResultKind.NOTHING, Priority.POLL, True, 2),
+        (ResultKind.NOTHING, Priority.BACKGROUND, True, 0),
+        (ResultKind.DAMAGED, Priority.OPERATOR_READ, False, 1),
+        (ResultKind.DAMAGED, Priority.POLL, True, 2),
+        (ResultKind.DAMAGED, Priority.BACKGROUND, True, 0),
+        (ResultKind.WRONG, Priority.OPERATOR_READ, True, 0),
+        (ResultKind.WRONG, Priority.POLL, True, 2),
+    ],
+)
+def test_read_is_repeated_by_its_priority_and_the_kind_of_its_end(
+    kind: ResultKind, priority: Priority, known: bool, times: int
+) -> None:
+    ends, job = Ends(known=known, retries=1), read(priority)
+    found = [ends.end(job, kind)]
+    while found[-1] is Next.REPEAT:
+        ends.now += 1.0
+        assert len(found) < 10, "it never ends"
+        found.append(ends.end(job, kind))
+    assert (len(found) - 1, job.repeats) == (times, times)
+    assert job.first_sent == (9.5 if times else None)
+    never = Ends(known=known, retries=0)
+    assert never.end(read(priority), kind) is Next.NOTHING
+
+
+def test_damaged_reply_may_come_again_unless_it_was_recognized() -> None:
+    for recognized in (True, False):
+        ends, job = Ends(retries=0), read()
+        ends.end(job, ResultKind.DAMAGED, recognized=recognized)
+        late = [] if recognized else [(1, job.expectation, 9.5, 10.0, job.pdu)]
+        assert ends.late == late
+    ends, write = Ends(), command()
+    ends.end(write, ResultKind.WRONG)
+    assert ends.late == [(1, write.expectation, 9.5, 10.0, b"")], "no copy of a write is expected"
+
+
+def test_wrong_reply_that_is_explained_by_an_earlier_request_is_a_silence() -> None:
+    ends, job = Ends(retries=0), read()
+    other = Piece(reply(bytes([2]) + Read(2, 100, 1).pdu() + bytes(2)), whole=True)
+    ends.end(job, ResultKind.WRONG, strays=[other])
+    assert isinstance(error_of(job), NoAnswer), "it is of another device"
+    job = read()
+    own = Piece(reply(bytes([1]) + Read(1, 100, 2).pdu() + bytes(2)), whole=True)
+    ends.end(job, ResultKind.WRONG, strays=[own])
+    assert isinstance(error_of(job), WrongReply)
+
+
+def test_write_that_was_not_sent_is_tried_again_and_then_reported_as_not_written() -> None:
+    ends, job = Ends(retries=2), command()
+    for tries in (1, 2):
+        assert ends.end(job, ResultKind.NOTHING, unsent=True) is Next.REPEAT
+        assert job.repeats == tries
+    assert ends.end(job, ResultKind.NOTHING, unsent=True) is Next.NOTHING
+    error = error_of(job)
+    assert (error.device, error.function, error.address) == (1, 6, 8501)
+    assert str(error) == "Device 1 did not answer a test read. Nothing was written."
+
+
+def test_broadcast_ends_when_it_was_sent() -> None:
+    job = Job(WriteOne(0, 8501, 0), Priority.STOP, WIDE)
+    assert Ends().end(job, ResultKind.NOTHING) == Reply((), 9.5, b"")
+
+
+@pytest.mark.parametrize(
+    ("request_", "kind", "again"),
+    [
+        (Read(1, 100, 1), ResultKind.REPLY, True), (Read(1, 100, 1), ResultKind.EXCEPTION, True),
+        (Read(1, 100, 1), ResultKind.NOTHING, False),
+        (WriteOne(1, 100, 1), ResultKind.REPLY, False),
+    ],
+)  # fmt: skip
+def test_reply_that_waited_for_this_program_is_requested_again(
+    request_: Request, kind: ResultKind, again: bool
+) -> None:
+    ends = Ends()
+    job = Job(request_, Priority.POLL, WIDE)
+    longest = ends.devices.time_out(1, request_.function, Priority.POLL)
+    for lay, doubted in ((longest + 0.9, False), (longest + 1.1, again)):
+        result = ExchangeResult(kind, end=10.0 - lay, turnaround=0.0)
+        assert ends.outcomes.waited_for_us(job, result) == doubted
