@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import groupby
+from operator import itemgetter
+
 from rich.style import Style
 from rich.text import Text
 
@@ -32,8 +35,8 @@ def gauge(
         if mark is not None:
             cells[min(inner - 1, _halves(mark, low, high, inner) // 2)] = ("┃", MARK)
     text = Text("├", LINE, no_wrap=True)
-    for character, item in cells:
-        text.append(character, item)
+    for item, run in groupby(cells, key=itemgetter(1)):
+        text.append("".join(character for character, _ in run), item)
     return text.append("┤", LINE)
 
 

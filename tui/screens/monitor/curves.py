@@ -6,6 +6,8 @@ import math
 import time
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import NamedTuple
 
 from rich.style import Style
@@ -272,8 +274,8 @@ def _axis(page: ShownPage, rows: int) -> list[Text]:
     if at is not None:
         cells[at] = (cells[at][0] if cells[at][0] != " " else "┴", KEY + CURSOR)
     axis = Text(" " * LABEL_CELLS, no_wrap=True).append("└", LINE)
-    for character, style in cells:
-        axis.append(character, style)
+    for style, run in groupby(cells, key=itemgetter(1)):
+        axis.append("".join(character for character, _ in run), style)
     if rows == 1:
         return [axis]
     return [axis, Text(" " * (LABEL_CELLS + 1), no_wrap=True).append(names, FAINT)]
