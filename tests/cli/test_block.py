@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from tests.sweeps import kept
 from tui.bus.errors import LineLost
 from tui.drive.profile.schema import Parameter
 from tui.session.settings.write import Writer
@@ -167,7 +168,7 @@ def test_indirect_block_takes_effect_after_a_reset() -> None:
         assert "cannot be read" in run(0, line, "-p", "atv21")
 
 
-@pytest.mark.parametrize("family", LONELY)
+@pytest.mark.parametrize("family", kept(LONELY, *LONELY[:2]))
 def test_family_without_blocks_says_so_and_shows_neighbors(family: str) -> None:
     line = f"sim:{family}"
     text = run(0, line, "-p", family)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tests.sweeps import kept
 from tui.drive.family_page import PageSection, family_page, page_lines
 from tui.drive.model import model_codes, model_of, model_read
 from tui.drive.profile import library
@@ -143,7 +144,7 @@ def test_page_of_altivar_71_has_other_servers_and_lamps() -> None:
     assert "MOD Lit for 200 ms" in text_of("atv71", "Lamps and display")
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "varmeca"))
 @given(width=st.integers(40, 160))
 def test_no_line_is_wider_than_the_page(family: str, width: int) -> None:
     for line in page_lines(family_page(library.load(family)), width):

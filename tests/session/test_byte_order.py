@@ -202,7 +202,7 @@ async def test_swapped_stop_word_runs_no_motor(family: str) -> None:
             assert simulation.drive(1).motor.frequency == 0, f"16#{word:04X}"
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "powerdrive", "varmeca"))
 @pytest.mark.parametrize("state", kept(["rest", "running", "fault"], "running"))
 async def test_healthy_drive_shows_no_swapped_word(family: str, state: str) -> None:
     spec = DriveSpec(family, 1, run_hz=20.0 if state == "running" else 0.0)

@@ -10,6 +10,7 @@ import pytest
 
 from tests.limits import WAS_OFF
 from tests.session.fake_clock import FakeClock
+from tests.sweeps import kept
 from tui.bus.fake import FakeLine
 from tui.bus.line import Timing
 from tui.drive.errors import ValueRefused
@@ -75,7 +76,7 @@ async def test_parameter_is_found_edited_applied_and_undone(family: str) -> None
         assert rows(editor.facts, "recent") == [code]
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "powerdrive"))
 async def test_selected_parameters_are_read_first(family: str) -> None:
     async with editing(family) as (made, editor):
         last = [p.code for p in editor.session.profile.parameters if p.access != "w"][-1]

@@ -9,6 +9,7 @@ import pytest
 
 from tests.programs import wait_until
 from tests.session.sets_bench import FAMILIES, bench
+from tests.sweeps import kept
 from tui.session.connect.identify import identify_drive
 from tui.session.journal import Entry
 from tui.session.journal_reading import entries_of
@@ -26,7 +27,7 @@ SECTIONS = [
 ]
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "powerdrive"))
 async def test_every_family_has_its_report(family: str) -> None:
     with bench(family, serial=True) as made:
         upload = Upload(made.session)

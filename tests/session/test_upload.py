@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.session.sets_bench import FAMILIES, bench
+from tests.sweeps import kept
 from tui.bus.errors import LineError
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import dump_set
@@ -13,7 +14,7 @@ from tui.session.read.upload import Upload, readable_codes, setting_codes
 from tui.simulator import FaultRates
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv31", "powerdrive"))
 async def test_every_readable_parameter_is_read_correctly(family: str) -> None:
     with bench(family) as made:
         reported: list[tuple[int, int]] = []

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
+from tests.sweeps import kept
 from tui.drive.blocks.wire_cost import Cost, Saving
 from tui.drive.settings.writable import AT_REST
 from tui.screens.blocks.pick_parameter import PickParameter
@@ -239,7 +240,7 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_confirmation() 
         assert made.drive().raw("FA51") == 500
 
 
-@pytest.mark.parametrize("family", ["atv312", "powerdrive"])
+@pytest.mark.parametrize("family", kept(["atv312", "powerdrive"], "powerdrive"))
 async def test_family_without_blocks_says_so_and_ignores_keys(family: str) -> None:
     async with bench(family) as made:
         await to_blocks(made, "neither")

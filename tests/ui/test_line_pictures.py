@@ -272,7 +272,11 @@ USUAL = [
     for state in STATES
     for size in (SMALL, LARGE)
 ]
-OTHERS = [(state, size) for state in ("no-line", "thirty-one") for size in ((60, 20), (200, 60))]
+OTHERS = [
+    pytest.param(state, size, marks=marks)
+    for state in ("no-line", "thirty-one")
+    for size, marks in (((60, 20), ()), ((200, 60), pytest.mark.sweep))
+]
 
 
 @pytest.mark.parametrize(
