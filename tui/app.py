@@ -29,7 +29,7 @@ from .screens.leaving import Leaving
 from .screens.line_check import LineCheck
 from .screens.line_owner import LineOwner, Opener
 from .screens.open_lines import LineOpening
-from .screens.places import Places
+from .screens.parameter_places import ParameterPlaces
 from .screens.status_refresher import FRAME_LOOK, StatusRefresher
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ LONGEST_CAUSE = 120
 
 
 class DrivePanelApp(
-    LastWords, KeyDispatcher, StatusRefresher, LineOwner, LineCheck, Places, Leaving
+    LastWords, KeyDispatcher, StatusRefresher, LineOwner, LineCheck, ParameterPlaces, Leaving
 ):
     """The panel on one line at a time.
 

@@ -169,9 +169,9 @@ async def test_action_of_the_current_screen_is_executed() -> None:
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, ConnectionScreen))
         await until(made.pilot, lambda: "n on Line" in reported(made.app))
-        await typed(made, "report")
+        await typed(made, "user words")
         await made.pilot.press("enter")
-        await until(made.pilot, lambda: "^p on Parameters" in reported(made.app))
+        await until(made.pilot, lambda: "^p on Scanner" in reported(made.app))
         assert not isinstance(made.app.screen, Ask)
 
 

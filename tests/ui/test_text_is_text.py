@@ -124,7 +124,7 @@ async def parameters(made: Bench) -> None:
     await made.pilot.press("slash", *"acc", "enter")
     await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
     await dialog(made, "enter", EditNumber)
-    for key in ("ctrl+s", "(report)"):
+    for key in ("ctrl+s", "ctrl+r"):
         await dialog(made, key)
     await files(made)
 

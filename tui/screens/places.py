@@ -10,7 +10,6 @@ from .keys.action import (
     CONNECTION,
     MESSAGES,
     MONITOR,
-    PARAMETERS,
     WIRING,
 )
 from .keys.screens import SCREENS
@@ -109,22 +108,6 @@ class Places(Panel):
         if place not in (MONITOR, MESSAGES):
             self.show_place(place, wanted)
 
-    async def action_find(self) -> None:
-        """Go to the parameter search; what is typed next is searched for."""
-        if shown := self.action_goto(PARAMETERS):
-            await shown
-        if self.chosen is not None:
-            self._ask_screen("action_search")
-
-    async def open_parameter(self, code: str) -> None:
-        """Show a parameter of the open drive in the editor, under the cursor."""
-        from textual.widgets import Input
-
-        if shown := self.action_goto(PARAMETERS):
-            await shown
-        self.screen.query_one("#search", Input).value = code
-        self.screen.set_focus(None)
-
     def action_messages(self) -> None:
         """Show all messages."""
         from .messages.screen import MessagesScreen
@@ -176,13 +159,6 @@ class Places(Panel):
     def action_open_file(self) -> None:
         """Open a file on the screen that can show it."""
         self._ask_screen("action_load_file", "This screen opens no files.")
-
-    async def action_eeprom(self) -> None:
-        """Save the settings of the open drive to its EEPROM."""
-        if shown := self.action_goto(PARAMETERS):
-            await shown
-        if self.chosen is not None:
-            self._ask_screen("action_save_eeprom")
 
     def _ask_screen(self, action: str, otherwise: str = "") -> None:
         """Call this method of the screen on top; report `otherwise` if it has none."""

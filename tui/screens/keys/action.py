@@ -26,6 +26,7 @@ KEY_NAMES = {
     "ctrl+l": "^l",
     "ctrl+s": "^s",
     "ctrl+o": "^o",
+    "ctrl+r": "^r",
     "shift+tab": "Shift+Tab",
     "pageup": "PgUp",
     "pagedown": "PgDn",

@@ -35,6 +35,7 @@ STOPS_ALL, STOPS_NONE = "STOP ALL", "cannot stop here"
 """Labels of the stop key if it stops every drive, or none."""
 SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
 OPEN = "Open a file: compare a parameter set, or stage an assignment."
+REPORT_DRIVE = "Report on the open drive: read everything and write a file (Markdown)."
 FIND = "Find a parameter by code, name, address or value; works on every screen."
 WIRING_HELP = "Show wiring and warnings of the family: pins, line rules, LEDs, commands, errata."
 WHY = "Diagnose why a silent drive gives no answer; show the next steps."
@@ -70,6 +71,7 @@ APP_ACTIONS: tuple[Action, ...] = (
     app_action("hear", "H", "", HEAR),
     app_action("save_shown", "ctrl+s", "", SAVE),
     app_action("open_file", "ctrl+o", "", OPEN),
+    app_action("report", "ctrl+r", "", REPORT_DRIVE),
     app_action("eeprom", "S", "", EEPROM),
     app_action("command_palette", "ctrl+p", "more", "Find an action by typing words."),
     app_action("help", "?,f1", "help", "Show the keys of this screen."),

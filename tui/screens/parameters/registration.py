@@ -67,7 +67,6 @@ REGISTERED = (
                 ("favorite", "*", "", "Add to the favorites, or remove from them."),
                 ("confirm", "y", "", KEEP),
                 ("stage_set", "i", "", "Stage the differences from the compared file."),
-                ("report", "", "", "Write a report on this drive (Markdown)."),
                 ("factory", "F", "", "Restore the factory settings. Needs arming; asks first."),
                 ("leave", "escape", "", "Leave the search, then the selection, then the screen."),
             ),
