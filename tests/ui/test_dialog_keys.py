@@ -7,7 +7,6 @@ import importlib
 import pkgutil
 import re
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -366,7 +365,11 @@ async def test_s_in_write_results_continues_with_saving(
     async with app.run_test(size=(80, 24)) as pilot:
         await on_monitor(app, pilot, monkeypatch)
         answers: list[object] = []
-        app.push_screen(Results(replace(APPLIED, unsaved=("ACC",))), answers.append)
+        codes = [f"SP{number:02}" for number in range(1, 12)]
+        app.push_screen(Results(APPLIED, codes), answers.append)
         await until(pilot, lambda: "S Save to EEPROM (asks)" in picture(app))
+        shown = " ".join(picture(app).replace("│", " ").split())
+        assert "Not in EEPROM, lost at power-off: SP01, " in shown
+        assert "SP08 and 3 more." in shown
         await pilot.press("S")
         await until(pilot, lambda: answers == [True])

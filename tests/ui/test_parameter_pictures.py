@@ -152,6 +152,7 @@ def rest(editor: Editor) -> None:
 
 def stopped(editor: Editor) -> None:
     applied = failed(editor)
+    editor.session.unsaved_settings.note_write("HSP", 480, 500)
     editor.applied = Applied(applied.results, applied.left, stopped="a stop came")
 
 

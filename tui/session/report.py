@@ -47,6 +47,10 @@ def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]
     return plain("\n".join(line for part in parts for line in (*part, "")), lines=True)
 
 
+PARAMETERS_READ = "- Parameters: {read} read", "- Parameters: {read} read, {absent} not"
+"""Without and with parameters that could not be read."""
+
+
 @dataclass(frozen=True, slots=True)
 class _Report:
     profile: Profile
@@ -69,6 +73,7 @@ class _Report:
         head = self.values.head
         known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
         model = model_read(self.profile, self.values.raws)
+        absent = len(self.values.absent)
         known += [f"- Model by its own code: {_cell(model)}"] if model else []
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
@@ -76,7 +81,7 @@ class _Report:
             f"- Read: {_when(head.time, self.zone)}; times here are {self._zone_text()}",
             f"- Profile: {self.profile.id}, version {head.profile_version}; panel {head.panel}",
             *(known or ["- The drive does not identify itself."]),
-            f"- Parameters: {len(self.values.raws)} read, {len(self.values.absent)} not",
+            PARAMETERS_READ[bool(absent)].format(read=len(self.values.raws), absent=absent),
         ]
 
     def line(self) -> list[str]:

@@ -13,6 +13,7 @@ from textual.widgets import Input
 from tui.bus.api import Frame
 from tui.bus.link import Link, TcpLink, label
 from tui.drive.profile.profile import Profile
+from tui.drive.sentences import counted
 from tui.widgets.drawing import rule
 from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.lines import Lines
@@ -37,6 +38,15 @@ HEADINGS = {
 """Heading of the list; the keys are (filtered, paused)."""
 FILTER_HINT = "drive, function, error or text, for example 2-read-error"
 FIND_HINT = "drive, function, error or text; Enter finds the next older frame"
+
+
+def count_text(matches: int, kept: int, *, filtered: bool) -> str:
+    """Return how many frames are kept, and with a filter, how many match."""
+    if not kept:
+        return "no frame yet"
+    if filtered:
+        return f"{matches or 'none'} of {counted(kept, '1 frame', '{count} frames')}"
+    return counted(kept, "1 frame", "{count} frames")
 
 
 class KeptLine(Protocol):
@@ -127,8 +137,8 @@ class FrameListScreen(PanelScreen):
         places = self._places(frames)
         self._up = min(self._up, max(0, len(places) - room))
         end = len(places) - self._up
-        count = f"{len(places)} of {len(frames)}" if self._filter else f"{len(frames)}"
-        lines = [rule(self._title(), width, f"{few}{count} frames, j to find")]
+        count = count_text(len(places), len(frames), filtered=bool(self._filter))
+        lines = [rule(self._title(), width, f"{few}{count}, j to find")]
         shown = places[max(0, end - room) : end]
         self.put("frames", lines + self._lines(frames, shown, columns))
 
@@ -296,7 +306,8 @@ class FrameListScreen(PanelScreen):
         frames = self._kept
         places = self._places(frames)
         line = label(self._source.link)
-        heading = [line, self._title(), f"{len(places)} of {len(frames)} frames"]
+        count = count_text(len(places), len(frames), filtered=len(places) < len(frames))
+        heading = [line, self._title(), count]
         text = frames_text(
             frames, places, self._all_words(frames, places), self._since_epoch, heading
         )

@@ -35,7 +35,9 @@ def heard_lines(
     shown = lines[top : top + room]
     drives = sum(bool(drive.tally.device) for drive in summary.drives)
     more = "" if len(lines) <= room else f"{top + 1} to {top + len(shown)} of {len(lines)}"
-    heading = counted(drives, "Traffic of 1 drive", "Traffic of {count} drives")
+    heading = "Traffic"
+    if drives:
+        heading = counted(drives, "Traffic of 1 drive", "Traffic of {count} drives")
     return [rule(heading, width, more), *shown], top
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from tui.bus.api import Frame
+from tui.drive.sentences import counted
 from tui.session.capture_file import CaptureFile
 from tui.session.paths import state_folder
 
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 RAW_NAME, TEXT_NAME = ".raw.pcapng", ".txt"
 """Endings of file names: frames as on the line, and text."""
+SAVED_FRAMES = "Saved: 1 frame in {path}", "Saved: {count} frames in {path}"
 SAVED_AS = (
     "The ending sets the form. .pcapng: Modbus/TCP, for tshark. .raw.pcapng: RTU with checksums."
     " .txt: text, one line per frame."
@@ -63,7 +65,7 @@ def _save(app: Panel, path: Path, kept: KeptFrames) -> None:
     except OSError as error:
         app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
     else:
-        app.tell(f"Saved: {count} frames in {path}")
+        app.tell(counted(count, *SAVED_FRAMES, path=path))
 
 
 def save_frames(path: Path, kept: KeptFrames) -> int:

@@ -219,21 +219,21 @@ def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
 def status_line(editor: Editor, where: str, width: int) -> Text:
     """The line between list and details: what is staged, not saved, or needs a reset."""
     text, count = Text("─ ", LINE, no_wrap=True), len(editor.staging.edits)
-    text.append(f"{count} staged", ATTENTION if count else FAINT)
     if count:
+        text.append(f"{count} staged", ATTENTION)
         text.append(f". {_keys_to_write(editor, 'it' if count == 1 else 'them')}", FAINT)
     if editor.unsaved:
-        text.append(" · ", LINE)
+        text.append(" · " if count else "", LINE)
         text.append(f"{len(editor.unsaved)} not saved", ALARM)
         text.append(": S", KEY)
     if editor.waits_for_reset:
-        text.append(" · ", LINE)
+        text.append(" · " if count or editor.unsaved else "", LINE)
         text.append(f"reset the drive for {', '.join(sorted(editor.waits_for_reset))}", ALARM)
     done, whole = editor.values.progress
     if done < whole:
         where = f"reading {done} of {whole} · {where}"
     text.truncate(max(8, width - len(where) - 5), overflow="ellipsis")
-    text.append(" ")
+    text.append(" " if text.cell_len > len("─ ") else "")
     text.append("─" * max(1, width - text.cell_len - len(where) - 3), LINE)
     text.append(f" {where} ", FAINT)
     text.append("─", LINE)

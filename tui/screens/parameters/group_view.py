@@ -41,9 +41,9 @@ class GroupEntry:
 
     @property
     def label(self) -> str:
-        """Its name with its number."""
+        """Its name with its number, unless that is zero."""
         name = self.choice.group or FILTER_LABELS[self.choice.filter]
-        return name if self.count is None else f"{name} {self.count}"
+        return f"{name} {self.count}" if self.count else name
 
 
 def group_lines(entries: Sequence[GroupEntry], chosen: Choice, width: int, room: int) -> list[Text]:

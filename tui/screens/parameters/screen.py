@@ -124,7 +124,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         name = listed.chosen.group or FILTER_LABELS[listed.chosen.filter]
         if listed.searched:
             name = "Found"
-        return f"{name} {listed.place} of {listed.count}" if listed.count else f"{name} 0"
+        return f"{name} {listed.place} of {listed.count}" if listed.count else f"{name}: none"
 
     def _empty(self) -> str:
         if self.query_one("#search", Input).value:

@@ -43,7 +43,7 @@ class Skipped(KeyQuestion[None]):
 
     def __init__(self, staged: int, label: str, left: Sequence[RestoreItem]) -> None:
         super().__init__()
-        self._head = f"Staged {staged} from {label}. Skipped {len(left)}."
+        self._head = f"{staged_text(staged, label)} Skipped {len(left)}."
         self._left = left
 
     def dialog(self) -> ComposeResult:
@@ -58,6 +58,20 @@ class Skipped(KeyQuestion[None]):
             with VerticalScroll(id="says"):
                 yield Plain(table)
             yield Plain(SKIPPED_KEYS, id="hint")
+
+
+def staged_text(count: int, label: str) -> str:
+    """Return how many values were staged from a file or a drive."""
+    return f"Staged {count} from {label}." if count else f"Nothing staged from {label}."
+
+
+def difference_text(label: str, writes: int, equal: int, skips: int) -> str:
+    """Return how a set differs from the drive; only counts that are not zero."""
+    counts = ((writes, "can be staged"), (equal, "equal"), (skips, "skipped"))
+    parts = [f"{count} {text}" for count, text in counts if count]
+    if not writes:
+        parts.insert(0, "nothing can be staged")
+    return f"{label}: {', '.join(parts)}."
 
 
 def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbout:
@@ -258,8 +272,7 @@ class SetKeys(ParameterKeys):
             editor.other = {"": 0}
         writes, skips = plan.count("write"), plan.count("skip")
         self.note(
-            f"{editor.other_label}: {writes} can be staged, {plan.count('equal')} equal,"
-            f" {skips} skipped.",
+            difference_text(editor.other_label, writes, plan.count("equal"), skips),
             "Press i to stage." if writes else "",
         )
         self.listed.choose(Choice("differs"))
@@ -284,7 +297,7 @@ class SetKeys(ParameterKeys):
         left = [item for item in plan.items_of_kind("skip") if item.reason != "no setting"]
         count = len(plan.edits)
         keys = self.how_to_write("all" if count > 1 else "it") if count else ""
-        self.note(f"Staged {count} from {editor.other_label}.", keys)
+        self.note(staged_text(count, editor.other_label), keys)
         if left:
             self.app.push_screen(Skipped(len(plan.edits), editor.other_label, left))
 

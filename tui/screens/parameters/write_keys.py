@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.style import Style
@@ -14,6 +14,7 @@ from textual.containers import Vertical, VerticalScroll
 
 from tui.drive.errors import DriveError
 from tui.drive.plain import plain
+from tui.drive.sentences import first_of
 from tui.drive.settings.edits import Edit, Edits, consequences
 from tui.drive.settings.limits import edit_problems
 from tui.drive.settings.writable import cuts_line
@@ -50,19 +51,25 @@ class Results(KeyQuestion[bool | None]):
         Binding("S", "save", show=False),
     ]
 
-    def __init__(self, applied: Applied, *, staged: bool = False) -> None:
-        """`staged`: edits are left, so u would first undo those."""
+    def __init__(
+        self, applied: Applied, unsaved: Collection[str] = (), *, staged: bool = False
+    ) -> None:
+        """`unsaved` are all settings that are not in EEPROM, those of earlier writes too.
+
+        `staged`: edits are left, so u would first undo those.
+        """
         super().__init__()
-        self._applied, self._staged = applied, staged
+        self._applied, self._unsaved, self._staged = applied, unsaved, staged
 
     def dialog(self) -> ComposeResult:
-        """The number of written edits, and the result of each."""
+        """The number of written edits, the result of each, and what is not in EEPROM."""
         with Vertical(id="dialog"):
             yield Plain(results_head(self._applied), id="question")
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
             keys = [("Enter or Esc", "Close")]
-            if self._applied.unsaved:
+            if self._unsaved:
+                yield Plain(Text(unsaved_text(self._unsaved), ALARM), id="unsaved")
                 keys.append(("S", "Save to EEPROM (asks)"))
             if self._applied.written and not self._staged:
                 keys.append(("Esc, then u", "Stage the old values"))
@@ -108,6 +115,15 @@ def results_head(applied: Applied) -> str:
     nothing = "Not known if written." if applied.unknown else "Nothing written."
     head = done_text(applied.written) or nothing
     return f"{head} {failed} still staged." if failed else head
+
+
+UNSAVED_NAMED = 8
+"""Settings that are named as not in EEPROM; the others are counted."""
+
+
+def unsaved_text(codes: Collection[str]) -> str:
+    """Return which settings are not in EEPROM."""
+    return f"Not in EEPROM, lost at power-off: {first_of(sorted(codes), UNSAVED_NAMED)}."
 
 
 def results_table(applied: Applied) -> Table:
@@ -231,7 +247,8 @@ class WriteKeys(ParameterKeys):
         self.list_again()
         stamp = applied.stamp
         if not applied.waits or applied.stopped or stamp != self.session.work.stops:
-            results = Results(applied, staged=len(self.editor.staging.edits) > 0)
+            staged = len(self.editor.staging.edits) > 0
+            results = Results(applied, self.editor.unsaved, staged=staged)
             self.app.push_screen(results, lambda save: self.action_save_eeprom() if save else None)
             return
 

@@ -99,10 +99,10 @@ class Search:
         """Progress as a short text."""
         found = len(self.answered)
         if self.ended:
-            return f"{self.ended}, {found} found"
+            return f"{self.ended}, {found or 'none'} found"
         if self.again:
             return f"{self.requested} of {self.of} again"
-        return f"{self.requested} of {self.of}, {found} found"
+        return f"{self.requested} of {self.of}, {found or 'none'} found"
 
     async def run(self, line: ModbusLine, found: Found) -> None:
         """Run the search; calls `found` for every address that is not silent.

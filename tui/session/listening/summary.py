@@ -93,6 +93,8 @@ def summary_lines(summary: ListeningSummary) -> list[str]:
     tally, lines = summary.tally, []
     pace = tally.exchanges / summary.seconds if summary.seconds else 0.0
     text = counted(tally.exchanges, *texts.LISTENED_TEXTS, seconds=summary.seconds, pace=pace)
+    if not tally.exchanges:
+        text = texts.HEARD_NONE_TEXT.format(seconds=summary.seconds)
     if summary.load is not None:
         text = f"{text} The line is {summary.load * 100:.0f} % busy."
     lines.append(text)

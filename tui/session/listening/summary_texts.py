@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+HEARD_NONE_TEXT = "Listened {seconds:.1f} s: no exchange."
 LISTENED_TEXTS = (
     "Listened {seconds:.1f} s: 1 exchange, {pace:.1f} a second.",
     "Listened {seconds:.1f} s: {count} exchanges, {pace:.1f} a second.",
