@@ -493,6 +493,23 @@ async def test_search_covers_all_groups_and_continues_in_the_found_one() -> None
         assert screen.listed.count > 1
 
 
+async def test_quitting_offers_to_save_what_is_not_in_eeprom() -> None:
+    async with bench("atv71") as made:
+        screen = await to_parameters(made)
+        screen.session.unsaved_settings.note_write("ACC", 30, 40)
+        await made.pilot.press("2")
+        await arm(made.pilot)
+        await made.pilot.press("q")
+        await until(made.pilot, lambda: "S Save drive 1 to EEPROM first" in picture(made.app))
+        assert "1 written setting is not saved to EEPROM" in " ".join(picture(made.app).split())
+        await made.pilot.press("S")
+        await until(made.pilot, lambda: "Save to EEPROM?" in picture(made.app))
+        assert made.app.place == "parameters"
+        await made.pilot.press("y")
+        await message(made, "saved to EEPROM")
+        assert not screen.session.unsaved
+
+
 async def test_s_in_write_results_asks_to_save() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)

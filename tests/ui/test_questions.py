@@ -20,7 +20,7 @@ from tui.screens.command.command_keys import OptionsScreen
 from tui.screens.connection.rows import rows_of
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
-from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.confirm import Confirm, SaveOffer
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
@@ -38,7 +38,7 @@ from tui.widgets.motor_state_text import motor_state_text
 from . import fakes
 from .test_command_flows import Bench, bench
 from .test_command_flows import writes as writes
-from .test_flows import arm, shown, until
+from .test_flows import arm, picture, shown, until
 
 MOMENT = 0.3
 """Seconds before which Enter and y do not answer, by the safety rules."""
@@ -206,19 +206,57 @@ async def test_enter_does_not_confirm_a_loss_and_says_so() -> None:
     assert str(Confirm("", "", yes="goes", no="stays", loses=False)._keys).startswith("y or Enter")
 
 
-async def test_long_question_scrolls_with_its_keys_visible() -> None:
-    follows = "\n".join(f"line {number}" for number in range(40))
-    requested = OpenQuestion(
-        Confirm("Write?", follows, yes="writes", no="writes nothing", loses=True)
-    )
-    async with requested.app.run_test(size=(80, 24)) as pilot:
+LONG = "\n".join(f"line {number}" for number in range(40))
+OFFER = SaveOffer("Save drive 12 to EEPROM first", lambda: None)
+
+
+def quit_question(text: str, offer: SaveOffer | None) -> Question[Any]:
+    return Confirm("Quit?", text, yes="Quit", no="Stay", loses=True, offer=offer)
+
+
+def leave_question(text: str, offer: SaveOffer | None) -> Question[Any]:
+    return Leave(text, offer=offer)
+
+
+MakeQuestion = Callable[[str, SaveOffer | None], Question[Any]]
+
+
+@pytest.mark.parametrize("size", [(80, 24), (60, 16)])
+@pytest.mark.parametrize("make", [quit_question, leave_question])
+async def test_long_question_scrolls_with_its_keys_visible(
+    make: MakeQuestion, size: tuple[int, int]
+) -> None:
+    requested = OpenQuestion(make(LONG, OFFER))
+    async with requested.app.run_test(size=size) as pilot:
         await requested.put(pilot)
         hint = requested.question.query_one("#hint")
         await until(pilot, lambda: "Up, Down Scroll" in str(hint.render()))
-        await until(pilot, lambda: 0 < hint.region.bottom < 24)
+        await until(pilot, lambda: 0 < hint.region.bottom < size[1] - 1)
+        assert hint.region.height == hint.virtual_size.height
+        assert "S Save drive 12 to EEPROM first" in str(hint.render())
         says = requested.question.query_one("#says")
         await pilot.press("down", "down")
         await until(pilot, lambda: says.scroll_y == 2)
+        await pilot.press("end")
+        await until(pilot, lambda: "line 39" in picture(requested.app))
+
+
+@pytest.mark.parametrize("offers", [True, False])
+@pytest.mark.parametrize(("make", "no"), [(quit_question, False), (leave_question, "stay")])
+async def test_question_saves_after_a_no_and_only_if_it_offers_that(
+    make: MakeQuestion, no: object, offers: bool
+) -> None:
+    saved: list[bool] = []
+    offer = SaveOffer("Save first", lambda: saved.append(True))
+    requested = OpenQuestion(make("", offer if offers else None))
+    async with requested.app.run_test(size=(80, 24)) as pilot:
+        await requested.put(pilot)
+        await pilot.press("S")
+        if not offers:
+            assert requested.app.screen is requested.question
+            await pilot.press("escape")
+        await until(pilot, lambda: requested.answers == [no])
+        await until(pilot, lambda: bool(saved) is offers)
 
 
 # A stop of the drive ends the question

@@ -13,14 +13,16 @@ from .app_port import Panel
 from .last_stops import LastStops, LineStops
 
 if TYPE_CHECKING:
+    from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.timeout_report import TimeoutWatch
 
-    from .dialogs.confirm import Confirm
+    from .dialogs.confirm import Confirm, SaveOffer
     from .dialogs.leave import LeaveChoice
 
 STOP_OR_TAKE_OVER = "Press Space to stop it. To take it over, press Esc, then T on Monitor."
+SAVE_FIRST = "Save drive {} to EEPROM first"
 ONE_STAGED = "Device {device}: 1 staged edit is not written."
 MANY_STAGED = "Device {device}: {count} staged edits are not written."
 ONE_UNSAVED = "Device {device}: 1 written setting is not saved to EEPROM. It is lost at power-off."
@@ -46,7 +48,8 @@ class Leaving(Panel):
             return
         if running := self._motors():
             reported = self._leaving_report(self.fleets, on_purpose=True)
-            requested = Leave("\n".join(reported), MotorStates(self, running))
+            states, offer = MotorStates(self, running), self._save_offer(self.fleets)
+            requested = Leave("\n".join(reported), states, offer)
             self.push_screen(requested, self._leave_motors)
             return
         if self._requested in self.screen_stack:
@@ -214,7 +217,27 @@ class Leaving(Panel):
             return None
         drives = [session for fleet in fleets for session in _concerned(fleet)]
         now = MotorStates(self, drives) if drives else None
-        return Confirm(question, "\n".join(reported), yes=yes, no=no, loses=True, now=now)
+        text, offer = "\n".join(reported), self._save_offer(fleets)
+        return Confirm(question, text, yes=yes, no=no, loses=True, now=now, offer=offer)
+
+    def _save_offer(self, fleets: Sequence[Fleet]) -> SaveOffer | None:
+        """Offer to save the settings of the first drive that has some not in EEPROM."""
+        from .dialogs.confirm import SaveOffer
+
+        consoles = (console for fleet in fleets for console in fleet.consoles)
+        unsaved = next((console for console in consoles if console.session.unsaved), None)
+        if unsaved is None:
+            return None
+        return SaveOffer(SAVE_FIRST.format(unsaved.device), lambda: self._save_first(unsaved))
+
+    async def _save_first(self, console: DriveConsole) -> None:
+        """Show Parameters on a drive, of any line, and ask to save its settings."""
+        line = next((line for line in self.panel_lines if console in line.fleet.consoles), None)
+        if line is not None and line.fleet is not self.fleet:
+            self.show_line(line)
+        if self.chosen is not console:  # showing Monitor again would disarm the drive
+            self.show_monitor(console)
+        await self.run_action("eeprom")
 
     def _unfinished(self, fleet: Fleet) -> list[str]:
         """Return the unfinished work on parameters that would be lost."""

@@ -1,8 +1,9 @@
-"""A dialog that states what follows, and asks for a yes or a no."""
+"""Dialogs that state what follows: one asks for a yes or a no."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from collections.abc import Callable
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -17,38 +18,38 @@ from .question import KeyQuestion, hint
 if TYPE_CHECKING:
     from .now import MotorStates
 
+T = TypeVar("T")
 
-class Confirm(KeyQuestion[bool]):
-    """States what follows; answers True for `y`, and False for Esc, `q` and `n`.
 
-    `yes` and `no` are the labels of the keys. If it `loses` nothing, because nothing is written,
-    moved or deleted, Enter means yes, too. A question that opens `by_itself` accepts an answer
-    only after a pause in typing.
+class SaveOffer(NamedTuple):
+    """The offer of a question to save to EEPROM what would be lost."""
+
+    text: str
+    """Label of the key S."""
+    work: Callable[[], object]
+    """Called after the question has been answered with no."""
+
+
+class Consequences(KeyQuestion[T]):
+    """States what follows; the text scrolls if the terminal is too small for it.
+
+    With an `offer`, S answers no and saves first.
     """
 
-    NO = False
-    BINDINGS: ClassVar = [
-        Binding("y", "yes", show=False),
-        Binding("enter", "enter", show=False),
-    ]
+    BINDINGS: ClassVar = [Binding("S", "save", show=False)]
 
     def __init__(
         self,
         question: str,
         follows: str,
-        *,
-        yes: str,
-        no: str,
-        loses: bool,
+        keys: tuple[tuple[str, str], ...],
         now: MotorStates | None = None,
-        by_itself: bool = False,
+        offer: SaveOffer | None = None,
     ) -> None:
         super().__init__(now)
-        self.by_itself = by_itself
-        self._question = question
-        self._follows = follows
-        self._loses = loses
-        self._keys = hint(("y" if loses else "y or Enter", yes), ("Esc or q", no))
+        self._question, self._follows, self._offer = question, follows, offer
+        *yes, no = keys
+        self._keys = hint(*yes, *([("S", offer.text)] if offer is not None else []), no)
 
     def dialog(self) -> ComposeResult:
         """The question, the motor's state, the consequences, and the keys."""
@@ -74,6 +75,50 @@ class Confirm(KeyQuestion[bool]):
         if self.is_attached and self.query("#follows"):
             self.query_one("#follows", Plain).update(follows)
             self._fit_list()
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Disable saving without an offer."""
+        if action == "save":
+            return self._offer is not None
+        return super().check_action(action, parameters)
+
+    def action_save(self) -> None:
+        """Answer no, and save first."""
+        if self._offer is not None:
+            self.answer(self.NO)
+            self.app.call_later(self._offer.work)
+
+
+class Confirm(Consequences[bool]):
+    """Answers True for `y`, and False for Esc, `q` and `n`.
+
+    `yes` and `no` are the labels of the keys. If it `loses` nothing, because nothing is written,
+    moved or deleted, Enter means yes, too. A question that opens `by_itself` accepts an answer
+    only after a pause in typing.
+    """
+
+    NO = False
+    BINDINGS: ClassVar = [
+        Binding("y", "yes", show=False),
+        Binding("enter", "enter", show=False),
+    ]
+
+    def __init__(
+        self,
+        question: str,
+        follows: str,
+        *,
+        yes: str,
+        no: str,
+        loses: bool,
+        now: MotorStates | None = None,
+        by_itself: bool = False,
+        offer: SaveOffer | None = None,
+    ) -> None:
+        keys = ("y" if loses else "y or Enter", yes), ("Esc or q", no)
+        super().__init__(question, follows, keys, now, offer)
+        self.by_itself = by_itself
+        self._loses = loses
 
     def action_yes(self) -> None:
         """Answer yes."""

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical, VerticalScroll
 
-from tui.widgets.plain import Plain
-
-from .question import KeyQuestion, hint
+from .confirm import Consequences, SaveOffer
 
 if TYPE_CHECKING:
     from .now import MotorStates
 
 LeaveChoice = Literal["stop", "leave", "stay"]
 
+LEAVE_KEYS = (
+    ("s or Enter", "Stop and quit"),
+    ("l", "Leave it running and quit"),
+    ("Esc or q", "Stay"),
+)
 
-class Leave(KeyQuestion[LeaveChoice]):
+
+class Leave(Consequences[LeaveChoice]):
     """Asks what happens to the running motors; stopping is safe, so Enter means that, too."""
 
     NO: ClassVar[LeaveChoice] = "stay"
@@ -28,25 +30,10 @@ class Leave(KeyQuestion[LeaveChoice]):
         Binding("l", "choose('leave')", show=False),
     ]
 
-    def __init__(self, follows: str, now: MotorStates | None = None) -> None:
-        super().__init__(now)
-        self._follows = follows
-
-    def dialog(self) -> ComposeResult:
-        """The running motors, the consequences of quitting, and the keys."""
-        with Vertical(id="dialog"):
-            yield Plain("A motor is running on your command", id="question")
-            yield from self.now_lines()
-            with VerticalScroll(id="says"):
-                yield Plain(self._follows, id="follows")
-            yield Plain(
-                hint(
-                    ("s or Enter", "Stop and quit"),
-                    ("l", "Leave it running and quit"),
-                    ("Esc or q", "Stay"),
-                ),
-                id="hint",
-            )
+    def __init__(
+        self, follows: str, now: MotorStates | None = None, offer: SaveOffer | None = None
+    ) -> None:
+        super().__init__("A motor is running on your command", follows, LEAVE_KEYS, now, offer)
 
     def action_choose(self, choice: LeaveChoice) -> None:
         """Answer with the choice."""
