@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import unicodedata
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from bisect import bisect_left
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import combinations
 from typing import NamedTuple
@@ -87,8 +88,14 @@ class ParameterSearch:
             for rank, code in enumerate(self._codes(profile, topic)):
                 for phrase in phrases | together:
                     self._add(phrase, code, rank)
-        known = {word for phrase in self._ranks for word in phrase}
-        self._known = {word: word for word in known} | self._same
+        self._phrases = list(self._ranks.items())
+        self._places: dict[str, int] = {}
+        """By word of a phrase, its places in the phrases as a number with a bit for each."""
+        for place, phrase in enumerate(self._ranks):
+            for word in phrase:
+                self._places[word] = self._places.get(word, 0) | 1 << place
+        self._known = {word: word for word in self._places} | self._same
+        self._spelled = sorted(self._known)
         words: dict[str, set[str]] = {p.code: set() for p in profile.parameters}
         for phrase, ranks in self._ranks.items():
             for code in ranks if phrase not in joined else ():
@@ -149,23 +156,38 @@ class ParameterSearch:
 
     def _best_phrases(self, words: Iterable[str]) -> Mapping[str, Score]:
         """Return, by code, the score of its best phrase that has all words or begins with them."""
+        words = tuple(words)
         typed = frozenset(self._same.get(word, word) for word in words)
-        meanings = [self._meanings(word) for word in words]
         found: dict[str, Score] = {}
-        for phrase, ranks in self._ranks.items():
-            if any(phrase.isdisjoint(some) for some in meanings):
-                continue
+        for place in self._places_of(words):
+            phrase, ranks = self._phrases[place]
             kind = TOPIC if phrase == typed else WORDS if typed <= phrase else BEGINNINGS
             for code, rank in ranks.items():
                 score = (kind, max(0, len(phrase) - len(typed)), rank)
                 found[code] = min(score, found.get(code, score))
         return found
 
+    def _places_of(self, words: Sequence[str]) -> Iterator[int]:
+        """Yield the places of the phrases that have a word for each of these."""
+        left = (1 << len(self._phrases)) - 1
+        for word in words:
+            fits = 0
+            for meaning in self._meanings(word):
+                fits |= self._places.get(meaning, 0)
+            left &= fits
+        while left:
+            place = left.bit_length() - 1
+            yield place
+            left ^= 1 << place
+
     def _meanings(self, word: str) -> Phrase:
         """Return the words of phrases that a typed word means, or that it begins if long enough."""
         if len(word) < SHORTEST_BEGINNING:
             return frozenset((self._same.get(word, word),))
-        return frozenset(same for other, same in self._known.items() if other.startswith(word))
+        first = at = bisect_left(self._spelled, word)
+        while at < len(self._spelled) and self._spelled[at].startswith(word):
+            at += 1
+        return frozenset(self._known[other] for other in self._spelled[first:at])
 
     def _score(
         self, entry: _Entry, phrase: Score | None, raw: str, words: Sequence[str]
