@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from tui.drive.blocks.wire_cost import Cost, Saving
 from tui.drive.settings.writable import AT_REST
 from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.blocks.view import cost_lines
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
@@ -24,6 +26,7 @@ from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.proposals import Proposals
 
 from .fakes import press
+from .test_block_pictures import proposed, scanner
 from .test_command_flows import Bench, bench
 from .test_flows import arm, picture, shown, until
 from .test_parameter_flows import open_file
@@ -291,7 +294,7 @@ async def test_p_names_the_keys_that_write_the_suggestion(
         await until(made.pilot, lambda: "FORWARD" in shown(made.app, "strip"))
         await made.pilot.press("p")
         await message(
-            made, "Staged: Monitor's cycle", "with the motor stopped", "Press u to discard it."
+            made, "Staged the assignment", "with the motor stopped", "Press u to discard it."
         )
         assert "w to write" not in shown(made.app, "said")
         await until(made.pilot, lambda: "Stop the motor, then press w" in shown(made.app, "detail"))
@@ -315,3 +318,14 @@ async def test_p_names_the_keys_that_write_the_suggestion(
         await until(made.pilot, lambda: made.app.place == "parameters")
         await until(made.pilot, lambda: "Staged" not in shown(made.app, "said"))
         assert "Press" not in shown(made.app, "said")
+
+
+@pytest.mark.parametrize("after", [30_000, 30_049, 30_050, 30_051, 29_951])
+@pytest.mark.parametrize("before", [50_000, 50_049, 50_050, 50_051])
+def test_shown_saving_is_the_difference_of_the_shown_costs(before: int, after: int) -> None:
+    editor = scanner()
+    proposed(editor)
+    costs = Saving(Cost(before, 3), Cost(after, 2))
+    line = cost_lines(editor, editor.proposals.blocks[0], costs, 120)[1].plain
+    first, second, change = (float(text) for text in re.findall(r"([-+]?[\d.]+) ms", line)[:3])
+    assert change == pytest.approx(second - first, abs=0.01)

@@ -230,7 +230,7 @@ def cost_lines(
             text.append("  → staged ", FAINT)
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
             text.append(f" {_requests(saving.after.requests)}", FAINT)
-            text.append(f"  ({_ms(-saving.microseconds, sign=True)})", ATTENTION)
+            text.append(f"  ({_ms(_shown_change(saving), sign=True)})", ATTENTION)
         whole = microseconds(profile, wire_timing(block_editor.session), inputs, outputs)
         reported = f"   one exchange {_ms(whole)}"
         if whole and text.cell_len + len(reported) <= width:
@@ -245,6 +245,12 @@ def cost_lines(
         for line in range(2)
     ]
     return [*lines, text, *frames]
+
+
+def _shown_change(saving: Saving) -> int:
+    """Return the microseconds between the two costs as they are shown, in tenths of 1 ms."""
+    before, after = (float(f"{c.microseconds / 1000:.1f}") for c in (saving.before, saving.after))
+    return round((after - before) * 1000)
 
 
 def _requests(count: int) -> str:
