@@ -59,6 +59,33 @@ command = { sources = ["Modbus"] }
 reference = { sources = ["Modbus"] }
 settings = [{ parameter = "MODE", value = 7 }]
 """
+PATH = """
+[[signal_paths]]
+id = "command"
+carries = "command"
+first = {{ {first} }}
+source = "{source}"
+confidence = "manual"
+
+[[signal_paths.switches]]
+name = "MODE"
+parameter = "MODE"
+other = {{ {other} }}
+positions = [{positions}]
+"""
+CONTACTS = '{ contact = 1, when = [{ parameter = "MODE", values = [0] }] }, { contact = 0 }'
+
+
+def path(
+    first: str = 'name = "Terminals"',
+    other: str = 'name = "Modbus", is_line = true',
+    positions: str = CONTACTS,
+    source: str = "guide 5.3",
+) -> list[tuple[str, str]]:
+    """A signal path with one switch, added to the file."""
+    text = PATH.format(first=first, other=other, positions=positions, source=source)
+    return [("\n[[enumerations]]", f"{text}\n[[enumerations]]")]
+
 
 Change = tuple[str, str]
 
@@ -275,6 +302,51 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
         [("\n[[enumerations]]", f"{SOURCE}\n[[enumerations]]")],
         "MODE = 7: is not one of its values: 0 By hand, 1 Pressure, 2 Level",
         "value = 7",
+    ),
+    "a source of a path without a name": (
+        path(first=""),
+        "a source has either a name or a parameter",
+        "first = {",
+    ),
+    "a source of a path that is this line in two ways": (
+        path(first='parameter = "MODE", is_line = true'),
+        "`is_line` and `word` are for a source with a name",
+        "first = {",
+    ),
+    "a value of a path that is none": (
+        path(first='parameter = "MODE", line = [7]'),
+        "MODE has no value 7",
+        "first = {",
+    ),
+    "a contact without a position": (
+        path(positions="{ contact = 0 }"),
+        "no position connects contact 1",
+        "[[signal_paths.switches]]",
+    ),
+    "a contact that does not exist": (
+        path(positions=CONTACTS.replace("{ contact = 0 }", "{ contact = 0 }, { contact = 2 }")),
+        "must be <= 1, not 2",
+        "positions = [",
+    ),
+    "a position after the last one": (
+        path(positions="{ contact = 0 }, { contact = 1 }"),
+        "a position without conditions must be the last one",
+        "[[signal_paths.switches]]",
+    ),
+    "a position at a value that is none": (
+        path(positions=CONTACTS.replace("[0]", "[9]")),
+        "MODE has no value 9",
+        "[[signal_paths.switches]]",
+    ),
+    "a word of a path that is not there": (
+        path(other='name = "Modbus", is_line = true, word = "WORD"'),
+        "there is no parameter 'WORD'",
+        "other = {",
+    ),
+    "a path without a document": (
+        path(source="memory"),
+        "its source begins with the id of a document. Known: guide",
+        'source = "memory"',
     ),
     "a factory value that is no name": (
         [('2 = "Level" }\nfactory = 0', '2 = "Level" }\nfactory = 5')],

@@ -66,7 +66,7 @@ def switch_texts(profile: Profile, raws: Mapping[str, int]) -> list[str]:
 def _in_force(profile: Profile, rows: Sequence[ChannelRow], raws: Mapping[str, int]) -> Channel:
     """Return the channel of the first row that applies; unknown if an earlier word is missing."""
     for row in rows:
-        unread = _unread(row.when, raws)
+        unread = undecided(row.when, raws)
         if unread == "":
             continue
         code = unread or (row.parameter if row.parameter not in raws else "")
@@ -78,7 +78,7 @@ def _in_force(profile: Profile, rows: Sequence[ChannelRow], raws: Mapping[str, i
     return UNKNOWN_CHANNEL
 
 
-def _unread(conditions: Sequence[When], raws: Mapping[str, int]) -> str | None:
+def undecided(conditions: Sequence[When], raws: Mapping[str, int]) -> str | None:
     """Return the first unread word that decides; None if all conditions hold, "" if one fails."""
     verdicts = [(when.parameter, when.holds(raws)) for when in conditions]
     if any(holds is False for _, holds in verdicts):

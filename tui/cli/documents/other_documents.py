@@ -147,6 +147,7 @@ class ProfileShown(Document, kw_only=True):
     monitoring: dict[str, Any]
     channels: dict[str, Any]
     control_sources: list[Any]
+    signal_paths: list[Any]
     communication_fault: dict[str, Any]
     memory: dict[str, Any]
     start_up: list[Any]

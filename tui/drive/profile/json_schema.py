@@ -100,6 +100,11 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "command": "Source of the command.",
         "reference": "Source of the reference.",
     },
+    "PathSwitch": {
+        "name": "Name of the switch, as short as its code.",
+        "positions": "Positions of the switch; the first one whose conditions hold applies.",
+    },
+    "SignalPath": {"carries": "Signal on the path."},
     "Source": {"title": "Title and edition of the document."},
     "Erratum": {
         "place": "Document and place in it.",
@@ -275,6 +280,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "faults": "Fault registers and the meaning of faults.",
         "monitoring": "Monitored values.",
         "control_sources": "Configurations of command and reference source.",
+        "signal_paths": "Switches between the sources of command and reference and the motor.",
         "communication_fault": "The drive's communication monitoring.",
         "memory": "Words that save settings or restore factory settings.",
         "start_up": "First commissioning in order, one table per step.",

@@ -132,14 +132,18 @@ def load_file(path: Path) -> Profile:
     return Profile(data, read_help)
 
 
-def rows_with_shared(listing: Listing) -> list[dict[str, Any]] | None:
-    """Return all parameters of a profile as rows of a file; None if it shares no rows."""
+SHARED_TABLES = ("signal_paths", "parameters")
+"""Tables that the packaged profiles share, in the order of a file."""
+
+
+def rows_with_shared(listing: Listing) -> dict[str, list[dict[str, Any]]] | None:
+    """Return all rows of the shared tables of a profile; None if it shares no rows."""
     from .shared_rows import parsed, read_tables, source_text
 
     if "rows_from" not in parsed(source_text(listing.path)).get("profile", {}):
         return None
-    rows: list[dict[str, Any]] = read_tables(listing.path, packaged_folder()).tables["parameters"]
-    return rows
+    tables = read_tables(listing.path, packaged_folder()).tables
+    return {name: tables.get(name, []) for name in SHARED_TABLES}
 
 
 def all_faults_of(path: Path) -> list[str]:

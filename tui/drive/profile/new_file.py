@@ -15,17 +15,23 @@ _ID = re.compile(r"""^id[ \t]*=[ \t]*(?:"[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
 _PREFIXES = re.compile(r"^reference_prefixes[ \t]*=[ \t]*\[[^\]]*\]", re.MULTILINE)
 _DEMO = re.compile(r"^(?:demo_hz|rows_from|without)\b[^\n]*\n", re.MULTILINE)
 _ROWS = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
+_OTHER_ROWS = r"^\[\[{0}[.\]].*?(?=^\[(?!\[{0}[.\]])|\Z)"
+"""Rows of a table and of the tables inside it."""
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 IDENTIFIER = re.compile(r"[a-z][a-z0-9_-]*")
 
 
 def new_profile_text(
-    source: str, old_id: str, new_id: str, rows: Iterable[Mapping[str, Any]] | None = None
+    source: str,
+    old_id: str,
+    new_id: str,
+    rows: Mapping[str, Iterable[Mapping[str, Any]]] | None = None,
 ) -> str:
     """Return a profile's text with another id, and without prefixes that recognize drives.
 
-    `rows` are all its parameters if it shares some, because a profile of the user contains them
-    itself. Raises ProfileError for an invalid id, and if the head cannot be copied.
+    `rows` are all rows of its tables that share some, parameters last, because a profile of the
+    user contains them itself. Raises ProfileError for an invalid id, and if the head cannot be
+    copied.
     """
     if not IDENTIFIER.fullmatch(new_id):
         raise ProfileError(
@@ -39,7 +45,11 @@ def new_profile_text(
     changed = _DEMO.sub("", _ID.sub(f'id = "{new_id}"', head[0], count=1))
     text = source[: head.start()] + changed + source[head.end() :]
     if rows is not None:
-        text = f"{_until_rows(text)}\n" + "\n".join(_row_text(row) for row in rows)
+        text = _until_rows(text)
+        for table in rows:
+            text = re.sub(_OTHER_ROWS.format(table), "", text, flags=re.MULTILINE | re.DOTALL)
+        parts = [_row_text(table, row) for table, own in rows.items() for row in own]
+        text = f"{text}\n" + "\n".join(parts)
     return _PREFIXES.sub(
         '# beginnings of the reference that the drive reports, such as ["NEW12"]\n'
         "reference_prefixes = []",
@@ -54,8 +64,8 @@ def _until_rows(text: str) -> str:
     return text[: first.start()] if first else text
 
 
-def _row_text(row: Mapping[str, Any]) -> str:
-    return "\n".join(["[[parameters]]", *(f"{key} = {_written(row[key])}" for key in row), ""])
+def _row_text(table: str, row: Mapping[str, Any]) -> str:
+    return "\n".join([f"[[{table}]]", *(f"{key} = {_written(row[key])}" for key in row), ""])
 
 
 def _written(value: Any) -> str:

@@ -33,6 +33,7 @@ ROW_KEYS: Mapping[TomlPath, str] = {
     ("faults", "codes"): "raw",
     ("faults", "help"): "raw",
     ("control_sources",): "id",
+    ("signal_paths",): "id",
     ("start_up",): "step",
     ("connectors",): "name",
     ("groups",): "name",

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from ..schema import ProfileData
 from ..toml_lines import TomlPath
-from . import charts, limits, names, parameters, registers
+from . import charts, limits, names, parameters, registers, signal_paths
 
 Finding = tuple[TomlPath, str]
 """Place of an error, and the error."""
@@ -17,6 +17,7 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     *names.NAME_RULES,
     *limits.LIMIT_RULES,
     *charts.CHART_RULES,
+    *signal_paths.PATH_RULES,
 )
 
 __all__ = ["RULES", "Finding"]

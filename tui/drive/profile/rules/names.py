@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from tui.drive.sentences import any_of
 
-from ..schema import Chart, Parameter, ProfileData
+from ..schema import Chart, Parameter, ProfileData, path_places
 from ..toml_lines import TomlPath
 
 TAKEN_IDS = frozenset({"new", "path"})
@@ -97,6 +97,8 @@ def _reference_places(data: ProfileData) -> Iterator[NamedPlace]:
 
 
 def _channel_names(data: ProfileData) -> Iterator[NamedPlace]:
+    for path, code in path_places(data.signal_paths):
+        yield ("signal_paths", *path), code
     for key in ("command", "reference", "switches"):
         for index, row in enumerate(getattr(data.channels, key)):
             yield ("channels", key, index, "parameter"), row.parameter

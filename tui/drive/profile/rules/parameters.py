@@ -37,7 +37,7 @@ def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         ((("faults", "codes", n, "raw"), f.raw) for n, f in enumerate(data.faults.codes)),
         "fault {} occurs twice; a raw code means one fault.",
     )
-    for table in ("sources", "enumerations", "charts", "blocks", "control_sources"):
+    for table in ("sources", "enumerations", "charts", "blocks", "control_sources", "signal_paths"):
         rows = getattr(data, table)
         yield from _twice(
             (((table, n, "id"), row.id) for n, row in enumerate(rows)),

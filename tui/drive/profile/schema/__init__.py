@@ -100,6 +100,7 @@ from .parameter import (
     WordType,
 )
 from .search import FamilySearch, FamilyTopic, SearchTopic, SearchWords
+from .signal_path import PathPosition, PathSource, PathSwitch, SignalPath, path_places
 from .whole import (
     Block,
     BlockChoice,
@@ -178,6 +179,9 @@ __all__ = [
     "Parameter",
     "ParameterGroup",
     "PastLimit",
+    "PathPosition",
+    "PathSource",
+    "PathSwitch",
     "Pin",
     "PortCounters",
     "ProfileData",
@@ -194,6 +198,7 @@ __all__ = [
     "SearchWords",
     "Setting",
     "SignalName",
+    "SignalPath",
     "SignedDecimalText",
     "Source",
     "SpeedFormula",
@@ -212,4 +217,5 @@ __all__ = [
     "WordAddress",
     "WordState",
     "WordType",
+    "path_places",
 ]

@@ -22,6 +22,7 @@ from .link import (
 )
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter, ParameterGroup
+from .signal_path import SignalPath
 from .wiring import Wiring
 
 
@@ -156,6 +157,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     monitoring: Monitoring
     channels: Channels = Channels()
     control_sources: list[ControlSource] = []
+    signal_paths: list[SignalPath] = []
     communication_fault: CommunicationFault | None = None
     memory: MemoryOrders = MemoryOrders()
     start_up: list[StartUpStep] = []
