@@ -29,7 +29,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.screens.status_refresher import FRAME_LOOK
 from tui.session.arming import Arming
-from tui.session.clock import Clock
+from tui.session.clock import REAL_CLOCK, Clock
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.open_line import OpenLine
 from tui.session.console import DriveConsole
@@ -66,7 +66,8 @@ READY = {**RUNNING, "ETA": 0x0231, "RFR": 0, "RFRD": 0, "LCR": 0, "OTR": 0, "OPR
 FAULT = {**READY, "ETA": 0x0218, "LFT": 18}
 ALARM = {**RUNNING, "ETA": 0x06B7, "LRS6": 1 << 11}
 
-CHANNELS = {"CHCF": 1, "FR1": 164, "FR2": 0, "RFC": 96, "CD1": 1, "CD2": 10, "CCS": 98, "FR1B": 0}
+CHANNELS = {"CHCF": 1, "FR1": 164, "FR2": 0, "RFC": 96, "CD1": 1, "CD2": 10, "CCS": 98, "FR1B": 0,
+            "RCB": 96, "FLO": 0, "FLOC": 1, "AI1C": 3100, "LFR": 500, "CMD": 15}  # fmt: skip
 STORED = {
     "RFP0": 488, "LCP0": 84, "ULP0": 3980, "THP0": 50, "RTP0": 2483,
     "EP0": 0x0637, "IP0": 0x0812, "CMP0": 0x000F, "CRP0": 0x0015,
@@ -271,10 +272,11 @@ def console_of(
     device: int = 2,
     family: str = "atv71",
     armed: float | None = None,
+    clock: Clock = REAL_CLOCK,
 ) -> DriveConsole:
     """A drive whose monitor has this snapshot, with a trend of a start and a run."""
     identity = ATV71 if family == "atv71" else None
-    session = DriveSession(StillLine(line), device, library.load(family), identity)
+    session = DriveSession(StillLine(line), device, library.load(family), identity, clock=clock)
     session.arming = session.work.arming = StillArming(session.line, armed)
     way = -1.0 if snapshot and snapshot.state.direction == "reverse" else 1.0
     raw = session.profile.quantity("output_frequency") is None

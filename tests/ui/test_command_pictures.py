@@ -56,6 +56,8 @@ def outcome(kind: OutcomeKind, text: str) -> Outcome:
 
 REMOTE = {**fakes.READY, "CCC": 1, "CRC": 1}
 RUNNING = {"raws": fakes.RUNNING}
+SWITCHED = {"CHCF": 2, "CCS": 133, "CCC": 1, "LRS7": 0b0101, "IL1R": 1}
+"""Commanded by the terminals while input LI5 is open."""
 LIMITS = {"HSP": 500, "LSP": 0, "ACC": 30, "INR": 1, "TFR": 600, "FRS": 500}
 STATES: dict[str, tuple[dict[str, Any], KeyInput, StopReport | None, bool]] = {
     "armed": ({"raws": fakes.READY}, KeyInput(57), None, False),
@@ -114,7 +116,7 @@ def panel(name: str) -> tuple[Any, MonitorScreen]:
     """The panel on a drive in that state."""
     how, given, report, unseen = STATES[name]
     snapshot = fakes.snapshot_of(library.load("atv71"), **how)
-    console = fakes.console_of(snapshot, armed=given.armed_for)
+    console = fakes.console_of(snapshot, armed=given.armed_for, clock=fakes.StillClock())
     console.session.work.outcome = given.outcome
     if given.lost:
         console.commander.given.note_command("CMD", 0x000F)
@@ -154,6 +156,7 @@ OVER = {
     "options": ("armed", ["o"]),
     "hand-back": ("armed", ["g"]),
     "control-source": ("armed", ["6", "down"]),
+    "control-switched": ("no-effect", ["6"]),
     "control-source-sure": ("armed", ["6", "down", "enter"]),
     "faults": ("tripped", ["5"]),
     "faults-none": ("armed", ["5"]),
@@ -180,11 +183,15 @@ def test_screens_of_commanding(
     state, keys = OVER[screen]
     app, monitor = panel(state)
     held = {**fakes.RUNNING, **fakes.CHANNELS, **fakes.STORED, **LIMITS}
+    if screen == "control-switched":
+        held |= SWITCHED
     monitor.session.image.confirm("LFR", 300, fakes.NOW)
 
     async def read(codes: list[str], **_: Any) -> Any:
         profile = monitor.session.profile
         raws = {code: held.get(code, 0) for code in (*codes, "INR")}  # INR scales the ramps
+        for code, raw in raws.items():
+            monitor.session.image.confirm(code, raw, fakes.NOW)
         return fakes.readings_of(profile, raws, fakes.NOW)
 
     monkeypatch.setattr(monitor.console, "read", read)

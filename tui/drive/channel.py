@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 from .profile.profile import Profile
@@ -50,10 +50,17 @@ def channel_codes(profile: Profile) -> list[str]:
     return list(dict.fromkeys(codes))
 
 
-def switch_texts(profile: Profile, raws: Mapping[str, int]) -> list[str]:
-    """Return sentences on the causes and the effects of a channel change."""
+def switch_texts(
+    profile: Profile, raws: Mapping[str, int], without: Collection[str] = ()
+) -> list[str]:
+    """Return sentences on the causes and the effects of a channel change.
+
+    `without` are parameters that are shown in another way.
+    """
     found = []
     for switch in profile.data.channels.switches:
+        if switch.parameter in without:
+            continue
         raw = raws.get(switch.parameter)
         if raw is None or raw in switch.fixed or not all(w.holds(raws) for w in switch.when):
             continue

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
+from tui.bus.api import Priority
+
 from .command.commander import Commander
 from .connect.identify import DriveIdentity
 from .drive import DriveSession
@@ -46,9 +48,13 @@ class DriveConsole:
         self.monitor.listen(self.recorder.take)
         self.teacher = Teacher(self.session)
 
-    async def read(self, codes: Iterable[str]) -> Mapping[str, Shown]:
-        """Read codes for a person. Raises the line's errors."""
-        return await Reader(self.session).read(codes)
+    async def read(self, codes: Iterable[str], *, again: bool = False) -> Mapping[str, Shown]:
+        """Read codes for a person, with the priority of a poll if `again`.
+
+        Raises the line's errors.
+        """
+        priority = Priority.POLL if again else Priority.OPERATOR_READ
+        return await Reader(self.session).read(codes, priority=priority)
 
     @property
     def device(self) -> int:

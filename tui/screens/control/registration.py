@@ -24,7 +24,8 @@ def create_control(console: DriveConsole) -> Screen[None]:
 
 def no_sources(console: DriveConsole) -> str:
     """Return why a drive has no Control screen; empty if it has one."""
-    if console.session.profile.data.control_sources:
+    data = console.session.profile.data
+    if data.control_sources or data.signal_paths:
         return ""
     return (
         f"Drive {console.device} sets its control source at the keypad. On Monitor, press t to take"

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING, ClassVar
 
+from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.widgets import OptionList
 
 from tui.bus.errors import LineClosed, LineError
 from tui.bus.link import SerialLink
-from tui.drive.channel import channel_codes, switch_texts
+from tui.drive.channel import switch_texts
 from tui.drive.chart import ENABLED_KINDS
 from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
 from tui.session.console import DriveConsole
+from tui.session.control_paths import ControlPaths
 from tui.session.drive import DriveSession
 from tui.session.proof.prover import Prover, hidden_at_rest
 from tui.session.proof.result import proof_entry
@@ -25,13 +27,21 @@ from tui.session.timeout_report import TimeoutWatch
 from tui.session.work import OutcomeKind, Permit, Task
 from tui.widgets.drawing import rule, wrapped
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STATE_STYLES, STRONG
 from tui.widgets.plain import entry
 
 from ..command.command_keys import OrderKeys
 from ..keys.action import SOURCES
 from ..keys.table import bindings
-from .view import change_lines, diagram, left_lines, note_lines, now_lines
+from .switch_view import LEAST_HEIGHT, LEAST_WIDTH, drawing, hints, written_paths
+from .view import (
+    change_lines,
+    headed_lines,
+    left_lines,
+    note_lines,
+    now_lines,
+    short_changes,
+)
 
 if TYPE_CHECKING:
     from tui.session.fleet import Fleet
@@ -44,30 +54,36 @@ WITH_RUNNING_MOTOR = (
     "THE MOTOR IS RUNNING. It reacts as set, and may coast; a hoist load falls. A stop is sent"
     " when the test ends, or when you press a stop key. "
 )
+FRAME_ROWS = 4
+"""Rows of the status bar, the tabs, the message and the key bar."""
+LEAST_LISTED, LEAST_DETAIL = 2, 5
+"""Rows of the list, and of the details below it, at least."""
+REREAD_EVERY = 2.0
+"""Seconds between two reads of the configuration; another program may change it."""
 TIMEOUTS_PER_TEST = 4.6
 """Duration of a test in communication timeouts, if the drive reacts as set."""
 
 
-def timeout_line(
-    session: DriveSession, watch: TimeoutWatch | None, proved: str, width: int
-) -> Text:
-    """Return the drive's timeout reaction, the result of its test, and its line settings."""
+def timeout_lines(
+    session: DriveSession, watch: TimeoutWatch | None, proved: str, width: int, *, whole: bool
+) -> list[Text]:
+    """Return the drive's timeout reaction and the result of its test; its line too if `whole`."""
     rules, link = session.profile.data.communication_fault, session.line.link
-    reported = Text("  Timeout       ", FAINT, no_wrap=True)
+    parts: list[tuple[str, Style]] = []
     if rules is None:
-        reported.append("none known", PLAIN)
+        parts.append(("none known", PLAIN))
     elif watch is None:
-        reported.append(f"{rules.timeout or 'timeout'} off, or not read yet", ALARM)
+        parts.append((f"{rules.timeout or 'timeout'} off, or not read yet", ALARM))
     else:
         does = watch.reaction.name if watch.reaction else "its own reaction"
-        reported.append(f"{rules.timeout} {watch.timeout:g} s, then ", STRONG)
-        reported.append(does, STRONG if watch.trips else ALARM)
-        reported.append(f" · {proved or 'not tested'}", PLAIN if proved else FAINT)
-    reported.append(f" · address {session.device}", FAINT)
-    if isinstance(link, SerialLink):
-        reported.append(f" · {link.baud} {link.format}", FAINT)
-    reported.truncate(width, overflow="ellipsis")
-    return reported
+        style = STRONG if watch.trips else ALARM
+        parts.append((f"{rules.timeout} {watch.timeout:g} s, then {does}", style))
+        parts.append((proved or "not tested", PLAIN if proved else FAINT))
+    if whole:
+        parts.append((f"address {session.device}", FAINT))
+    if whole and isinstance(link, SerialLink):
+        parts.append((f"{link.baud} {link.format}", FAINT))
+    return headed_lines("Timeout", parts, width)
 
 
 def warning_lines(session: DriveSession, width: int) -> list[Text]:
@@ -133,6 +149,13 @@ def begin_test(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: bool
     session.work.put(Task(carry_out, owner=console, working=working), stamp)
 
 
+def fitted(lines: list[Text], room: int) -> list[Text]:
+    """Return the lines that fit, with a sign at the last one if there are more."""
+    if len(lines) <= room or room < 2:
+        return lines[: max(0, room)]
+    return [*lines[: room - 1], lines[room - 1].copy().append(" …", FAINT)]
+
+
 class ControlSourceScreen(OrderKeys):
     """The configurations of a family; Enter writes the chosen one, if armed and at standstill."""
 
@@ -146,41 +169,58 @@ class ControlSourceScreen(OrderKeys):
         self.console = console
         self.session = console.session
         self._sources = self.session.profile.data.control_sources
-        self._raws: dict[str, int] = {}
+        self._paths = ControlPaths(self.session)
         self._trouble = "reading the configuration"
         self._seen: object = None
+        self._listed: object = self
+        """The configuration that the list marks; this screen before the first list."""
 
     def body(self) -> ComposeResult:
-        """Commander and timeout, the list, the details of the chosen configuration."""
+        """Commander and timeout, the signal paths, the list, and the details of its choice."""
         yield Lines(id="now")
+        yield Lines(id="paths")
         yield OptionList(id="sources", compact=True)
         yield Lines(id="detail")
 
     def on_mount(self) -> None:
-        """Show the list, and read the present configuration."""
+        """Show the list, and read the present configuration again and again."""
         self._list()
-        self.query(OptionList).focus()
-        self.run_worker(self._read(), exclusive=True, group="sources")
+        found = self.query_one(OptionList)
+        found.display = bool(self._sources)
+        found.focus()
+        self._read_again(again=False)
+        self.set_interval(REREAD_EVERY, self._read_again)
 
-    async def _read(self) -> None:
+    def _read_again(self, *, again: bool = True) -> None:
+        """Read the configuration, unless this is in progress; a poll if `again`."""
+        if not any(worker.group == "sources" and worker.is_running for worker in self.workers):
+            self.run_worker(self._read(again=again), group="sources")
+
+    async def _read(self, *, again: bool) -> None:
         try:
-            profile = self.session.profile
-            codes = [*source_codes(profile), *channel_codes(profile)]
-            readings = await self.console.read(dict.fromkeys(codes))
+            readings = await self.console.read(self._paths.codes, again=again)
         except LineError as error:
             self._trouble = str(error)
         else:
-            self._raws = {c: r.raw for c, r in readings.items() if r.raw is not None}
             bad = [r for r in readings.values() if r.raw is None]
             self._trouble = f"{bad[0].parameter.code}: {bad[0].error}" if bad else ""
         self._list()
         self.look()
 
+    @property
+    def _raws(self) -> Mapping[str, int]:
+        """Current raw values; none before all words of the configurations were read."""
+        raws = self._paths.raws
+        return raws if all(code in raws for code in source_codes(self.session.profile)) else {}
+
     def _list(self) -> None:
         """List the configurations, with a mark at the active one."""
         if not (found := self.query(OptionList)):
             return  # the screen was left before it was composed
-        today = source_in_force(self.session.profile, self._raws)
+        today = self._today()
+        if today is self._listed:
+            return
+        self._listed = today
         options = found.first()
         at = options.highlighted
         if at is None:
@@ -195,7 +235,9 @@ class ControlSourceScreen(OrderKeys):
         options.highlighted = at
 
     @property
-    def _chosen(self) -> ControlSource:
+    def _chosen(self) -> ControlSource | None:
+        if not self._sources:
+            return None
         return self._sources[self.query_one(OptionList).highlighted or 0]
 
     def on_option_list_option_highlighted(self) -> None:
@@ -203,33 +245,71 @@ class ControlSourceScreen(OrderKeys):
         self.look()
 
     def draw(self, width: int) -> None:
-        """Draw the commander, the timeout, and the chosen configuration."""
+        """Draw the commander, the timeout, the signal paths, and the chosen configuration."""
         super().draw(width)
-        found = source_changes(self.session.profile, self._chosen, self._raws)
-        lines = [rule("Signal path of the selected configuration", width), *diagram(self._chosen)]
-        lines.append(rule("Enter writes", width))
-        if self._raws:
-            lines += change_lines(self.session.profile, found, width)
-        notes = note_lines(self._chosen, found, width)
-        room = self.query_one("#detail").size.height
-        lines += [*([Text("")] if len(lines) + len(notes) < room else []), *notes]
-        if warnings := warning_lines(self.session, width):
-            lines += [Text(""), rule("On a communication loss", width), *warnings]
-        self.put("detail", lines)
-        self.put_all("now", self._now(width))
+        self._list()
+        now, paths = self._now(width), self._drawn_paths(width)
+        self.put_all("now", now)
+        self.put_all("paths", paths)
+        room = self.size.height - FRAME_ROWS - len(now) - len(paths)
+        if self._sources:
+            rows = max(LEAST_LISTED, min(len(self._sources), room - LEAST_DETAIL))
+            options = self.query_one(OptionList)
+            if options.size.height != rows:
+                options.styles.height = rows
+            room -= rows
+        self.put("detail", fitted(self._detail(width, room), room))
         outcome = self.commander.outcome
         if outcome is not None and outcome is not self._seen and outcome.kind != "working":
             self._seen = outcome
-            self.run_worker(self._read(), exclusive=True, group="sources")
+            self._read_again(again=False)
+
+    @property
+    def _is_drawn(self) -> bool:
+        """True if the terminal has room for the drawing."""
+        return self.size.width >= LEAST_WIDTH and self.size.height >= LEAST_HEIGHT
+
+    def _drawn_paths(self, width: int) -> list[Text]:
+        """The paths as a drawing if there is room, else in words, and the ways to this line."""
+        if not self._is_drawn:
+            return [*written_paths(self._paths, width), *hints(self._paths, width)]
+        latest, speed, style = self.console.latest, "", FAINT
+        parameter = self.session.profile.quantity("output_frequency")
+        if latest is not None and parameter is not None:
+            reading = latest.readings.get(parameter.code)
+            number = None if reading is None or latest.error else reading.current_number
+            speed = "-----" if number is None else f"{number:.1f}"
+            style = STATE_STYLES.get(latest.state.kind, PLAIN) if number is not None else FAINT
+        lines = drawing(self._paths, speed, style, width)
+        return [*lines, *hints(self._paths, width)]
+
+    def _detail(self, width: int, room: int) -> list[Text]:
+        """The chosen configuration with its writes and notes, and the family's warnings."""
+        warnings = warning_lines(self.session, width)
+        lines: list[Text] = []
+        if (chosen := self._chosen) is not None:
+            found = source_changes(self.session.profile, chosen, self._raws)
+            notes = note_lines(chosen, found, width)
+            writes = change_lines(self.session.profile, found, width) if self._raws else []
+            if writes and 1 + len(writes) + min(1, len(notes)) > room:
+                writes = short_changes(self.session.profile, found, width)
+            lines = [rule("Enter writes the selected configuration", width), *writes, *notes]
+        if warnings and len(lines) + 2 + len(warnings) <= room:
+            lines += [Text(""), rule("On a communication loss", width), *warnings]
+        return lines
 
     def _now(self, width: int) -> list[Text]:
         profile, latest = self.session.profile, self.console.latest
-        switches = switch_texts(profile, self._raws)
-        lines = now_lines(profile, self._today(), latest, self._trouble, switches, width)
-        silence = timeout_line(self.session, self._watch(), self.console.proved, width)
+        drawn = {switch.parameter for path in profile.data.signal_paths for switch in path.switches}
+        switches = switch_texts(profile, self._raws, drawn)
+        whole, today = self._is_drawn, self._today()
+        head, more = now_lines(profile, today, latest, self._trouble, switches, width, whole=whole)
+        silence = timeout_lines(
+            self.session, self._watch(), self.console.proved, width, whole=whole
+        )
         fleet = self.app.fleet
         left = fleet.left_behind(self.console) if fleet is not None else ""
-        return [lines[1], *left_lines(left, width), silence, *lines[2:]]
+        return [*head, *left_lines(left, width), *silence, *more]
 
     def _watch(self) -> TimeoutWatch | None:
         """The drive's communication timeout, once it has been read."""
@@ -264,7 +344,9 @@ class ControlSourceScreen(OrderKeys):
 
     def action_write_chosen(self) -> None:
         """Ask, then write the chosen configuration."""
-        found = source_changes(self.session.profile, self._chosen, self._raws)
+        if (chosen := self._chosen) is None:
+            return
+        found = source_changes(self.session.profile, chosen, self._raws)
         if not self._raws:
             self._refuse("The configuration has not been read yet.")
         elif not found:
@@ -275,7 +357,6 @@ class ControlSourceScreen(OrderKeys):
                 f"Writes {codes}, each read back. A run command present at the new source"
                 " starts the motor."
             )
-            work = partial(self.commander.configure, self._chosen)
-            name = self._chosen.name
-            self._ask(f"Switch to {name}?", follows, "Write", "Cancel", work)
+            work = partial(self.commander.configure, chosen)
+            self._ask(f"Switch to {chosen.name}?", follows, "Write", "Cancel", work)
         self.look()

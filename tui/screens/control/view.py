@@ -4,23 +4,48 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rich.style import Style
 from rich.text import Text
 
 from tui.drive.control_source import SourceChange
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import ControlSource, Way
+from tui.drive.profile.schema import ControlSource
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.drive_state import channel_text
 from tui.session.monitor.snapshot import Snapshot
-from tui.widgets.drawing import cut, fitted_names, wrapped
-from tui.widgets.palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
+from tui.widgets.drawing import fitted_names, wrapped
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN, STRONG
 
-SOURCE_WIDTH = 16
-WIRE = 18
 LEFT_ROWS = 3
+PART_ROWS = 3
+"""Rows of one part of a line with a head, at most."""
+SHORT_ROWS = 9
+"""Rows of the writes in one sentence, at most."""
+NOW_HEAD = 14
+"""Cells of the head of a line."""
 CHANGE_CODE, CHANGE_NAME = 10, 12
 """Cells of the code of a change, and those of its name at least."""
+
+
+def headed_lines(head: str, parts: Sequence[tuple[str, Style]], width: int) -> list[Text]:
+    """Return parts with their styles after a head, on as many lines as they need."""
+    line, lines = Text(f"  {head:<{NOW_HEAD}}", FAINT, no_wrap=True), []
+    room = width - 2 - NOW_HEAD
+    begun = False
+    for text, style in parts:
+        used = line.cell_len - 2 - NOW_HEAD
+        if begun and used + len(f" · {text}") > room:
+            lines.append(line)
+            line, begun = Text(" " * (2 + NOW_HEAD), no_wrap=True), False
+        first, *more = wrapped(text, room, PART_ROWS) or [""]
+        line.append(" · " if begun else "", FAINT)
+        line.append(first, style)
+        begun = True
+        for part in more:
+            lines.append(line)
+            line = Text(" " * (2 + NOW_HEAD), no_wrap=True).append(part, style)
+    return [*lines, line]
 
 
 def now_lines(
@@ -30,28 +55,27 @@ def now_lines(
     trouble: str,
     switches: Sequence[str],
     width: int,
-) -> list[Text]:
-    """Return three lines: a blank, the present commander with its configuration, and switches.
+    *,
+    whole: bool,
+) -> tuple[list[Text], list[Text]]:
+    """Return the present commander, with its configuration if `whole`; and what can change it.
 
-    `switches` are texts about inputs that switch to another commander.
+    `switches` are sentences about that.
     """
-    lines = [Text("")]
     state = latest.state if latest is not None and not latest.error else None
-    text = Text("  Commanded by  ", FAINT, no_wrap=True)
-    text.append((state.channel if state else "") or _channel(profile, latest), STRONG)
+    parts = [((state.channel if state else "") or _channel(profile, latest), STRONG)]
     if trouble:
-        text.append(f"   {trouble}", ALARM)
-    elif today is None:
-        text.append("   the active configuration is not listed", ALARM)
-    else:
-        text.append(f"   configuration {today.name}", FAINT)
-    text.truncate(width, overflow="ellipsis")
-    reported = (
-        "; ".join(switch.partition(":")[0] for switch in switches)
-        if len(switches) > 1
-        else "".join(switches)
-    )
-    return [*lines, text, Text(cut(f"  {reported}", width).rstrip(), ATTENTION, no_wrap=True)]
+        parts.append((trouble, ALARM))
+    elif today is not None and whole:
+        parts.append((f"configuration {today.name}", FAINT))
+    elif today is None and profile.data.control_sources:
+        parts.append(("the active configuration is not listed", ALARM))
+    more = [
+        Text(f"  {line}", ATTENTION)
+        for text in switches
+        for line in wrapped(text, width - 4, PART_ROWS)
+    ]
+    return headed_lines("Commanded by", parts, width), more
 
 
 def left_lines(left: str, width: int) -> list[Text]:
@@ -76,27 +100,6 @@ def _channel(profile: Profile, latest: Snapshot | None) -> str:
     )
 
 
-def diagram(source: ControlSource) -> list[Text]:
-    """The signal paths of command and reference; always four lines."""
-    return [*_way(source.command, "command"), *_way(source.reference, "reference")]
-
-
-def _way(way: Way, goal: str) -> list[Text]:
-    first = Text(no_wrap=True)
-    first.append(f"   {way.sources[0]:<{SOURCE_WIDTH}}", STRONG)
-    if len(way.sources) == 1:
-        first.append("─" * (WIRE + 2) + "▶ ", LINE)
-        first.append(goal, PLAIN)
-        return [first, Text("")]
-    first.append("───┐ ", LINE)
-    first.append(way.switch, ATTENTION)
-    second = Text(no_wrap=True)
-    second.append(f"   {way.sources[1]:<{SOURCE_WIDTH}}", STRONG)
-    second.append("───┴" + "─" * (WIRE - 2) + "▶ ", LINE)
-    second.append(goal, PLAIN)
-    return [first, second]
-
-
 def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) -> list[Text]:
     """Return the pending writes, one parameter after another."""
     if not found:
@@ -110,6 +113,16 @@ def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) ->
         _change(change, f"{fitted[name]:<{room}}", *texts, width)
         for change, name, texts in zip(found, names, values, strict=True)
     ]
+
+
+def short_changes(profile: Profile, found: Sequence[SourceChange], width: int) -> list[Text]:
+    """Return the pending writes in one sentence, for a small terminal."""
+    texts = [
+        f"{change.parameter.code}{'' if change.verified else '?'}"
+        f" {_named(profile, change, change.old)} → {_named(profile, change, change.new)}"
+        for change in found
+    ]
+    return [Text(f"   {line}", PLAIN) for line in wrapped(", ".join(texts), width - 4, SHORT_ROWS)]
 
 
 def _change(change: SourceChange, name: str, old: str, new: str, width: int) -> Text:
@@ -135,9 +148,12 @@ def _named(profile: Profile, change: SourceChange, raw: int | None) -> str:
 
 def note_lines(source: ControlSource, found: Sequence[SourceChange], width: int) -> list[Text]:
     """Return the note on a configuration, and a warning about unverified parameters."""
-    lines = [Text(f"   {line}", FAINT) for line in wrapped(source.note, width - 4, 2)]
+    lines = [Text(f"   {line}", FAINT) for line in wrapped(source.note, width - 4, PART_ROWS)]
     unsure = [change.parameter.code for change in found if not change.verified]
     if unsure:
         text = f"? No available manual confirms the address of {', '.join(unsure)}."
-        lines.append(Text(cut(f"   {text}", width).rstrip(), ALARM))
+        lines = [
+            *(Text(f"   {line}", ALARM) for line in wrapped(text, width - 4, PART_ROWS)),
+            *lines,
+        ]
     return lines
