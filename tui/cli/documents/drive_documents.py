@@ -27,6 +27,7 @@ from .parts import (
     ModelField,
     OldTimeoutField,
     StateField,
+    StatusWordField,
     ValueField,
     WatchedValueField,
 )
@@ -97,6 +98,7 @@ class StatusDocument(DriveDocument, kw_only=True):
     control: ControlField | None
     watch: OldTimeoutField | None
     left_behind: LeftBehindDocument | None
+    words: dict[str, StatusWordField | None]
     values: dict[str, ValueField | None]
     unread: list[str]
 

@@ -39,6 +39,16 @@ class ValueField(DocumentPart):
     unsure: bool | UnsetType = UNSET
 
 
+class StatusWordField(DocumentPart):
+    """A command or status word; `bits` are the names of its bits that are 1."""
+
+    code: str
+    address: int
+    raw: int
+    text: str
+    bits: list[str]
+
+
 class WatchedValueField(DocumentPart, kw_only=True):
     """One value of a cycle; `time` is when it was read, null where it never was."""
 

@@ -17,6 +17,7 @@ from .errors import DONE, LINE_TROUBLE
 from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
 from .rows import Column
+from .status_words import status_words, word_fields, word_rows
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -177,6 +178,7 @@ def _codes(profile: Profile) -> list[str]:
     channels = [profile.quantity(quantity) for quantity in CHANNEL_NAMES]
     codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
     codes += [parameter.code for parameter in channels if parameter is not None]
+    codes += [parameter.code for parameter in status_words(profile).values()]
     codes += alarm_words(profile)
     codes += deciding_codes(profile)
     for chart in profile.data.charts:
@@ -245,6 +247,7 @@ def status_document(line_text: str, status: Status) -> StatusDocument:
         control=control_field(status.session),
         watch=watch_field(status.watch),
         left_behind=LeftBehindDocument(**status.left.fields()) if status.left else None,
+        words=word_fields(status.session.profile, status.readings),
         values=shown_fields(status.session.profile, status.readings),
         unread=list(status.unread),
     )
@@ -286,6 +289,7 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         ("Commands", status.refused or "commands can have an effect"),
         ("Comm. timeout", _time_out_text(status)),
         *control_row(status.session),
+        *word_rows(profile, status.readings),
         *shown_values(profile, status.readings).items(),
         *([("Not read", ", ".join(status.unread))] if status.unread else []),
     ]
