@@ -98,6 +98,7 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "state"))
     monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(tmp_path / "group"))
     monkeypatch.delenv("DRIVEPANEL_LINE", raising=False)
+    monkeypatch.setenv("DRIVEPANEL_RECORD", "off")  # a file for each line of each test takes time
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "home").mkdir()
     # lines of the test itself have none; programs that it starts have

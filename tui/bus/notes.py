@@ -47,6 +47,8 @@ class Notes:
         """The callback passes a message to the other programs, if there are any."""
         self._tell = tell
         self._clock = clock
+        self.heard: Callable[[LineNote], object] = lambda _: None
+        """Called with each new note; must not wait."""
         self._lock = threading.Lock()
         self._kept: dict[LineNote, float] = {}
         """When each note came, the oldest first."""
@@ -65,7 +67,8 @@ class Notes:
         """Keep a note; a duplicate is kept once."""
         now = self._clock()
         with self._lock:
-            if note not in self._kept:
+            new = note not in self._kept
+            if new:
                 self._kept[note] = now
                 self._size += _size(note)
             while self._size > MOST_NOTES or (
@@ -74,6 +77,8 @@ class Notes:
                 old = next(iter(self._kept))
                 del self._kept[old]
                 self._size -= _size(old)
+        if new:
+            self.heard(note)
 
     def of(self, device: int, kind: str) -> tuple[LineNote, ...]:
         """The notes of a device and kind, the oldest first."""

@@ -13,6 +13,7 @@ from pathlib import Path
 from types import MappingProxyType
 
 from .bounds import MOST_NOTICE, MOST_TEXT
+from .ended_exchange import EndedExchange
 from .errors import stopped_first_text
 from .keep_alive import KeepAlives
 from .leases import WriteLeases
@@ -87,6 +88,8 @@ class SharedState:
         """True if only armed devices may be written on the line."""
         self.events = EventHub()
         """Passes on what happens on the line."""
+        self.record: Callable[[EndedExchange], object] | None = None
+        """Called in the line's thread with each exchange of this program; must not wait."""
         self.accepts_care: Callable[[int, bytes], bool] = accepts_any_care
         """True if this program can stop a device by the care for it, should it hold the line.
 

@@ -34,9 +34,10 @@ NAME = "drivepanel"
 _LINE_HELP, _, _STATUSES = (main.epilog or "").partition("Exit status:")
 
 FILES = (
-    ("$XDG_CONFIG_HOME/drivepanel/settings.toml", "Names of lines."),
+    ("$XDG_CONFIG_HOME/drivepanel/settings.toml", "Names of lines; the record on or off."),
     ("$XDG_CONFIG_HOME/drivepanel/profiles/", "Profiles of your own."),
     ("$XDG_STATE_HOME/drivepanel/journal.jsonl", "The journal of writes to drives."),
+    ("$XDG_STATE_HOME/drivepanel/record/", "The records of lines, one file for each day."),
     ("$XDG_STATE_HOME/drivepanel/drivepanel.log", "The log."),
 )
 VARIABLES = (
@@ -44,6 +45,7 @@ VARIABLES = (
     ("DRIVEPANEL_CONFIG", "The configuration folder (default: in $XDG_CONFIG_HOME)."),
     ("DRIVEPANEL_STATE", "The state folder (default: in $XDG_STATE_HOME)."),
     ("DRIVEPANEL_MQTT_PASSWORD", "The password for the MQTT broker of serve and publish."),
+    ("DRIVEPANEL_RECORD", "Turn the record of lines on or off (default: settings.toml)."),
     ("NO_COLOR", "Draw without colors."),
 )
 CAUTION = (

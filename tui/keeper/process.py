@@ -23,6 +23,7 @@ from tui.bus.share.keeper_share import CARE_INTERVAL, KeeperShare, Keeping
 from tui.bus.share.keeping import KeeperOrder
 from tui.bus.share.messages import VERSION
 from tui.bus.share.sharing import KEEPER_STARTS
+from tui.session.connect.recorded_line import record_line
 from tui.session.connect.share_place import this_program
 from tui.session.event_notes import EventNotes
 from tui.session.events import EventLog
@@ -60,6 +61,7 @@ class Keeper:
             share=partial(KeeperShare, keeping),
             gated=True,
         )
+        self._recorder = record_line(self._line, order.place.name)
         self._journal = Journal()
         self._guardian = OrphanMotorGuard(self._line, self._journal)
         self._events = EventLog()
@@ -87,6 +89,8 @@ class Keeper:
             self._line.open()
             self._until_unneeded()
             self._line.close()
+        if self._recorder is not None:
+            self._recorder.close()
 
     def _until_unneeded(self) -> None:
         """Return when this keeper is to end, and no motor is still to be stopped.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import weakref
 from collections.abc import Mapping
@@ -15,8 +16,9 @@ from tui.bus.api import ModbusLine
 from tui.bus.bounds import MOST_CARE
 from tui.bus.line_events import ControlDenied, DevicesStopped, LineEvent
 from tui.bus.link import label
+from tui.bus.notes import LineNote
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
-from tui.drive.profile.profile import Profile
+from tui.drive.profile.profile import Profile, digest_of
 
 from .arming import Arming
 from .byte_order import ByteOrder
@@ -25,6 +27,7 @@ from .connect.contradiction import contradiction
 from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
 from .connect.prepared_stop import prepared_stop
+from .event_notes import PROFILE_OF_DRIVE
 from .image import RegisterImage
 from .reading import Reading
 from .shown import Rating
@@ -99,7 +102,16 @@ class DriveSession:
         self.stirs = 0
         """Number of requests to re-read every value."""
         line.describe(device, limits_of(profile))
+        self.note_profile()
         self._hear_others()
+
+    def note_profile(self) -> None:
+        """Have the recorder of the line know by which profile this program reads the drive."""
+        identity = self.known_identity
+        note = {"profile": self.profile.id, "hash": digest_of(self.profile)}
+        note |= {"reference": identity.reference, "version": identity.version}
+        data = json.dumps(note).encode()
+        self.line.facts.notes.leave(LineNote(self.device, PROFILE_OF_DRIVE, data))
 
     def _hear_others(self) -> None:
         """Obey the stops of other programs, and disarm if another program commands the drive.

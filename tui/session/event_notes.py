@@ -1,4 +1,4 @@
-"""Messages about the drives of a line, kept for the next program on it."""
+"""Notes of programs on a line: messages about its drives for the next program, and profiles."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from tui.bus.shared_state import SharedState
 from .events import Event, EventLog
 
 EVENTS_OF_LINE = "events"
+PROFILE_OF_DRIVE = "profile"
+"""Kind of the note, in JSON, that names the profile by which a program reads a drive."""
 MOST_CHARACTERS = MOST_NOTE // 8
 SAME_WITHIN = 2.0
 """Seconds in which equal messages of several programs are about the same event."""

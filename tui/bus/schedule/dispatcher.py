@@ -114,6 +114,8 @@ class Dispatcher:
 
     def stray(self, piece: Piece, time: float) -> None:
         """Note a whole frame that came when none was due: requests may have waited for it."""
+        alone = ExchangeResult(ResultKind.NOTHING, strays=[piece], sent=time, end=time)
+        self._outcomes.record(piece.device, b"", alone)
         self._outcomes.note_stray(piece, time)
         self.steps.stray(piece)
         self._wake.set()
@@ -225,6 +227,8 @@ class Dispatcher:
             # failed with the others, once the line's state says that it is lost
             self._queue.put_back(job)
             self.in_flight = False
+            cut = ExchangeResult(ResultKind.NOTHING, sent=begun, end=self._clock())
+            self._outcomes.record(job.request.device, job.pdu, cut, job)
             if job.expectation is not None:
                 now = self._clock()
                 self._devices.may_come(job.request.device, job.expectation, begun, now)
@@ -252,6 +256,7 @@ class Dispatcher:
             probed = await master.exchange(
                 Sending(request.device, probe.pdu(), probe.expectation(), time_out)
             )
+            self._outcomes.record(request.device, probe.pdu(), probed, job)
             self._outcomes.count_beside(request.device, probed)
         if master.echo is False:
             result.kind, result.pdu = ResultKind.REPLY, job.pdu
@@ -272,6 +277,7 @@ class Dispatcher:
         device = job.request.device
         await master.quiet()
         result = await master.exchange(self._sending(job))
+        self._outcomes.record(device, job.pdu, doubted, job, "copy")
         self._outcomes.count_beside(device, doubted)
         if result.pdu != doubted.pdu and job.expectation is not None:
             # it was a copy: one more reply to this request is on its way
@@ -294,6 +300,7 @@ class Dispatcher:
 
     def _conclude(self, job: Job, result: ExchangeResult, begun: float) -> None:
         self._outcomes.hear_gateway(job, result)
+        self._outcomes.record(job.request.device, job.pdu, result, job)
         if job.expectation is not None:
             self.steps.note(job, job.expectation, result)
         self._back_to_back.count(job, begun, self._clock())

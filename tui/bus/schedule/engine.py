@@ -7,8 +7,12 @@ import logging
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from time import time
 from typing import TypeVar
 
+from tui.wire.frames import pdu_of
+
+from ..ended_exchange import EndedExchange
 from ..errors import HOPELESS, LineBehind, LineClosed, LineError, LineLost
 from ..line_events import StateChanged
 from ..link import Link, SerialLink, TcpLink, label
@@ -95,7 +99,7 @@ class Engine:
             lambda message: self._shared is not None and self._shared.pass_on(message),
             self._dispatcher.wake,
             lambda: open_transport(link, around, alone=False),
-            lambda data: self.trace.add(clock(), "out", data),
+            self._note_prepared,
         )
         self._connection = Connection(
             link,
@@ -195,6 +199,16 @@ class Engine:
             self._loop.call_soon_threadsafe(self._last_way.put, writes, ended)
         except RuntimeError:
             raise LineClosed from None
+
+    def _note_prepared(self, data: bytes) -> None:
+        """Note a finished frame that was sent."""
+        now = self._clock()
+        self.trace.add(now, "out", data)
+        if (record := self.facts.record) is not None:
+            sent = pdu_of(data, tcp=isinstance(self._link, TcpLink))
+            if sent is not None:
+                pdu = bytes([sent.function]) + sent.body
+                record(EndedExchange(sent.device, pdu, "sent", b"", now, now, time()))
 
     def _take(self, job: Job) -> None:
         if self._closed:

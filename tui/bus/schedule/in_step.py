@@ -142,6 +142,7 @@ class InStep:
         try:
             result = await master.exchange(Sending(device, probe.pdu(), expectation, time_out))
             self._outcomes.hear_gateway(job, result)
+            self._outcomes.record(device, probe.pdu(), result, job)
         finally:
             if result is None or result.kind in UNANSWERED:
                 sent = begun if result is None else result.sent

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterable
 from enum import Enum
+from time import time
 
 from tui.safety import MISSES
 from tui.wire.overheard import overheard_request
 
+from ..ended_exchange import EndedExchange
 from ..errors import (
     OUTCOME_UNKNOWN,
     ChecksumFault,
@@ -26,6 +29,8 @@ from ..tally import Tally
 from .patience import Devices
 from .queue import Job
 from .shared_values import SharedValues
+
+log = logging.getLogger(__name__)
 
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway reports that a device behind it did not answer."""
@@ -128,6 +133,29 @@ class Outcomes:
         text = f"Device {request.device} did not answer a test read. Nothing was written."
         job.fail(NoAnswer(request.device, request.function, request.register, text))
         return False
+
+    def record(
+        self, device: int, pdu: bytes, result: ExchangeResult, job: Job | None = None, as_: str = ""
+    ) -> None:
+        """Pass an exchange on to the recorder; `as_` names its result if that is not its kind."""
+        if (record := self._facts.record) is None:
+            return
+        good = result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION)
+        try:
+            record(
+                EndedExchange(
+                    device, pdu, as_ or result.kind.value,
+                    result.pdu if good else result.received,
+                    result.sent, result.end, time() - (self._clock() - result.end),
+                    job.program if job is not None else "",
+                    job.repeats if job is not None else 0,
+                    tuple(piece.data for piece in result.strays),
+                )
+            )  # fmt: skip
+        except Exception:
+            # nothing may depend on the recorder
+            log.exception("the recorder failed")
+            self._facts.record = None
 
     def count_beside(self, device: int, result: ExchangeResult) -> None:
         """Count the reply to a request that was sent in addition to the requested one."""

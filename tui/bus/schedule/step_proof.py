@@ -130,6 +130,7 @@ class StepProof:
         try:
             sending = Sending(device, request.pdu(), expectation, time_out)
             result = await master.exchange(sending)
+            self._outcomes.record(device, sending.pdu, result, job)
         finally:
             self.busy = False
             if result is None or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):

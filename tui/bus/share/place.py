@@ -65,6 +65,12 @@ class Owner(msgspec.Struct, frozen=True):
         return self.program.name == KEEPER and not self.socket and not has_ended(self.program)
 
 
+def file_name_of(key: str) -> str:
+    """Return a file name for the key of a line: a readable part, and a unique digest."""
+    readable = re.sub(r"[^A-Za-z0-9]+", "-", key).strip("-")[-24:]
+    return f"{readable}-{hashlib.sha256(key.encode()).hexdigest()[:12]}"
+
+
 @dataclass(frozen=True, slots=True)
 class SharePlace:
     """The meeting place of one line."""
@@ -79,9 +85,8 @@ class SharePlace:
 
     @property
     def name(self) -> str:
-        """A file name of the line: a readable part, and a digest that makes it unique."""
-        readable = re.sub(r"[^A-Za-z0-9]+", "-", self.key).strip("-")[-24:]
-        return f"{readable}-{hashlib.sha256(self.key.encode()).hexdigest()[:12]}"
+        """The name of the line's files."""
+        return file_name_of(self.key)
 
     @property
     def lock_path(self) -> Path:

@@ -8,6 +8,7 @@ import zlib
 from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from functools import cached_property, lru_cache
+from hashlib import sha256
 
 import msgspec
 
@@ -79,6 +80,12 @@ def is_verified(parameter: Parameter) -> bool:
 
 LONGEST_UNPACKED = 1 << 24
 """Most bytes of an unpacked profile."""
+
+
+@lru_cache(maxsize=32)
+def digest_of(profile: Profile) -> str:
+    """Return the SHA-256 of a profile without its help, in hexadecimal."""
+    return sha256(msgspec.json.encode(profile.data)).hexdigest()
 
 
 def unpacked_profile(packed: bytes) -> Profile:

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 LONGEST_SETTINGS = 200_000
 """Bytes of a file that may be the settings."""
 LINES_TABLE = "lines"
+RECORD_TABLE, RECORD_KEY = "record", "on"
 MOST_NAMED = 200
 _NAME = re.compile(r"(?!COM\d+$)[A-Za-z][A-Za-z0-9_-]{0,31}", re.IGNORECASE)
 _TAKEN = frozenset({"factory"})
@@ -67,6 +68,8 @@ class LineSettings(NamedTuple):
     """Content of the file; empty if it cannot be read."""
     places: Mapping[str, str] = NO_PLACES
     """File, line and key by name."""
+    record: bool = True
+    """False if `on = false` in the table of the record."""
 
 
 def settings_file() -> Path:
@@ -167,8 +170,13 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
     at: dict[str, str] = {}
     faults: list[tuple[TomlPath, str]] = []
     for key, value in tables.items():
+        if key == RECORD_TABLE:
+            faults += _record_faults(value)
+            continue
         if key != LINES_TABLE or not isinstance(value, dict):
-            faults.append(((key,), f"only a table [{LINES_TABLE}] is known here"))
+            faults.append(
+                ((key,), f"only a table [{LINES_TABLE}] or [{RECORD_TABLE}] is known here")
+            )
             continue
         for name, reported in list(value.items())[:MOST_NAMED]:
             if fault := next(_faults(name, reported, found), None):
@@ -179,7 +187,24 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
     fault_texts = (
         f"{path}:{places.get(key, 1)}: {'.'.join(map(str, key))}: {fault}." for key, fault in faults
     )
-    return LineSettings(path, found, tuple(fault_texts), text, at)
+    return LineSettings(path, found, tuple(fault_texts), text, at, _is_recorded(tables))
+
+
+def _is_recorded(tables: Mapping[str, Any]) -> bool:
+    table = tables.get(RECORD_TABLE)
+    return not isinstance(table, dict) or table.get(RECORD_KEY) is not False
+
+
+def _record_faults(table: object) -> Iterator[tuple[TomlPath, str]]:
+    """Yield the errors of the table that turns the record off."""
+    if not isinstance(table, dict):
+        yield (RECORD_TABLE,), f"a table with {RECORD_KEY} is wanted"
+        return
+    for key, value in table.items():
+        if key != RECORD_KEY:
+            yield (RECORD_TABLE, key), f"only {RECORD_KEY} is known here"
+        elif not isinstance(value, bool):
+            yield (RECORD_TABLE, key), "true or false is wanted"
 
 
 def _faults(

@@ -13,13 +13,14 @@ from typing import TYPE_CHECKING, Protocol
 
 from tui.bus.errors import LinkSyntaxError
 
-from .line_key import SIMULATED_PREFIX
+from .line_key import SIMULATED_PREFIX, line_key
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
     from tui.bus.link import Link, SerialLink, UsualSettings
     from tui.simulator import DriveSpec, Simulation
 
+    from ..record.recorder import LineRecorder
     from .known_line import KnownLine
 
 
@@ -49,6 +50,8 @@ class OpenLine:
     """Opens the line again at other settings, for this program alone."""
     farewells: dict[int, Farewell] = field(default_factory=dict)
     """By address, the report on each drive before the line is closed."""
+    recorder: LineRecorder | None = None
+    """Records what this process itself sends on the line; None if it does not."""
 
     @property
     def label(self) -> str:
@@ -63,6 +66,8 @@ class OpenLine:
     def close(self) -> None:
         """Close the line, then its transport."""
         self.line.close()
+        if self.recorder is not None:
+            self.recorder.close()
         if self.simulation is not None:
             self.simulation.stop()
 
@@ -94,8 +99,10 @@ def open_line(
     from tui.bus.line import Line
     from tui.bus.link import absolute, parse_link
     from tui.bus.share.keeping import can_start
+    from tui.bus.share.place import file_name_of
     from tui.bus.share.sharing import Sharing
 
+    from .recorded_line import record_line
     from .share_place import share_place, this_program
 
     link = absolute(parse_link(text, usual))
@@ -112,7 +119,8 @@ def open_line(
     def again(other: SerialLink) -> ModbusLine:
         return Line(other, read_only=read_only, gated=True)
 
-    return _opened(OpenLine(text, line, again=again), wait)
+    name = place.name if place is not None else file_name_of(line_key(text))
+    return _opened(OpenLine(text, line, again=again, recorder=record_line(line, name)), wait)
 
 
 def reopen(opened: OpenLine, baud: int, format: str, *, wait: float) -> None:

@@ -126,6 +126,7 @@ class Monitor:
         """
         self.stop()
         self._notes.ask()
+        self.session.note_profile()  # with the scales that were learned since
         self.period = period
         rates = rates_of(self.profile) if codes is None else Rates(tuple(dict.fromkeys(codes)))
         known = {*rates.fast, *rates.changing, *rates.slow}
