@@ -36,7 +36,7 @@ def completed(typed: str) -> list[str]:
 def test_commands_are_completed() -> None:
     assert completed("st") == ["status", "stop"]
     assert set(COMMANDS) <= set(completed(""))
-    assert completed("-v re") == ["read", "reference", "report", "reset", "restore"]
+    assert completed("-v re") == ["read", "record", "reference", "report", "reset", "restore"]
 
 
 def test_completion_imports_no_command() -> None:

@@ -51,6 +51,8 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
     "what it does": (0, ("status", *DRIVE), {"StatusDocument"}),
     "its counters": (0, ("counters", *DRIVE, "--frames", "5"), {"CountersDocument"}),
     "cycles": (0, ("watch", *DRIVE, "--every", "0.1", "--count", "2"), {"CycleDocument"}),
+    "a recording": (0, ("record", *DRIVE, "RFR", "--out", "FOLDER/new.sqlite", "--for", "0.3"),
+                    {"RecordDocument"}),
     "a reference": (0, ("reference", *DRIVE, "20", "--arm"), {"CommandDocument"}),
     "stops": (0, ("stop", DRIVE[0], "--all"), {"StopDocument"}),
     "a stop": (0, ("stop", *DRIVE), {"StopDocument"}),

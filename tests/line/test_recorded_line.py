@@ -102,12 +102,12 @@ def check_record(found: Exchanges, wire: Exchanges, *, lost: int = 0) -> None:
 
 def test_record_of_a_keeper_equals_the_log_of_the_wire(wire: Exchanges) -> None:
     with bench(*DRIVES) as (_, line):
+        run = drivepanel("run", line, "-p", "atv71", "--reference", "30Hz", "--arm", "--for", "0.5")
+        assert run.returncode == 0, run.stderr
         watch = drivepanel(
             "watch", line, "-d", "1", "-d", "2", "--every", "0.1", "--count", "25", "--json"
         )
         assert watch.returncode == 0, watch.stderr
-        run = drivepanel("run", line, "-p", "atv71", "--reference", "30Hz", "--arm", "--for", "0.5")
-        assert run.returncode == 0, run.stderr
         with record_of_line() as base:
             found = exchanges_in(base)
             check_record(found, wire)

@@ -22,6 +22,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "prove": ("prove", "Test how a drive reacts to communication loss."),
     "publish": ("publish", "Publish drive values to an MQTT broker."),
     "read": ("read", "Read parameters from a drive."),
+    "record": ("record", "Record values to a file, always or around triggers."),
     "reference": ("single_orders", "Set a drive's reference."),
     "report": ("report", "Write a report on a drive to a file."),
     "reset": ("single_orders", "Reset a drive's fault."),

@@ -1,0 +1,121 @@
+"""`drivepanel record`: the file has what was read, always or around triggers."""
+
+from __future__ import annotations
+
+import json
+import signal
+import sqlite3
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.programs import DRIVEPANEL, port_of, served, simulated
+
+from .commands import ended, run, tcp_line
+
+SHORT = ("--every", "0.1")
+
+
+def rows(path: Path) -> list[tuple[Any, ...]]:
+    columns = "device, function, address, registers, quality, words"
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as base:
+        return base.execute(f"SELECT {columns} FROM reply ORDER BY id").fetchall()
+
+
+def events(path: Path, kind: str) -> list[str]:
+    with closing(sqlite3.connect(f"file:{path}?mode=ro", uri=True)) as base:
+        found = base.execute("SELECT text FROM event WHERE kind = ? ORDER BY id", (kind,))
+        return [text for (text,) in found]
+
+
+def test_record_has_the_words_of_the_named_codes_and_their_form(tmp_path: Path) -> None:
+    path = tmp_path / "values.sqlite"
+    with tcp_line("atv71@2", "atv71@3", "--set", "ACC=123") as line:
+        drives = ("-d", "2", "-d", "3")
+        text = run(0, "record", line, "ACC", "ULN", *drives, *SHORT, "--out", path, "--for", "1")
+    found = rows(path)
+    assert text == f"Recorded {len(found)} values to {path}.\n"
+    assert len(found) >= 8
+    assert {row[:5] for row in found} == {
+        (device, 3, address, 1, 0) for device in (2, 3) for address in (9001, 3207)
+    }
+    assert {row[5] for row in found if row[2] == 9001} == {b"\0\x7b"}
+    forms = [json.loads(text) for text in events(path, "parameter")]
+    assert [form["code"] for form in forms] == ["ACC", "ULN"] * 2
+    assert {json.loads(text)["profile"] for text in events(path, "profile")} == {"atv71"}
+
+
+def test_trigger_records_the_seconds_around_it_and_ends_after_the_count(tmp_path: Path) -> None:
+    path = tmp_path / "values.sqlite"
+    with tcp_line("atv71@2", "--run", "20") as line:
+        done = ended(
+            0, "record", line, "-d", "2", "RFR", *SHORT, "--out", path, "--trigger", "RFR>10,1",
+            "--before", "0.5", "--after", "0.5", "--count", "1", "--json",
+        )  # fmt: skip
+    reported = json.loads(done.stdout)
+    assert [item["device"] for item in reported["triggers"]] == [2]
+    assert reported["triggers"][0]["text"].startswith("RFR ")
+    assert (reported["values"], reported["lost"]) == (len(rows(path)), 0)
+    assert 3 <= reported["values"] <= 15
+    assert events(path, "trigger") == [reported["triggers"][0]["text"]]
+
+
+def test_nothing_is_recorded_without_a_trigger_that_fires(tmp_path: Path) -> None:
+    path = tmp_path / "values.sqlite"
+    with tcp_line("atv71@2") as line:
+        arguments = ("-d", "2", "RFR", *SHORT, "--out", path, "--trigger", "fault", "--for", "0.5")
+        run(0, "record", line, *arguments)
+    assert rows(path) == []
+
+
+def test_ctrl_c_ends_the_recording_with_a_whole_file(tmp_path: Path) -> None:
+    path = tmp_path / "values.sqlite"
+    with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        command = (
+            "record",
+            line,
+            "-d",
+            "2",
+            "RFR",
+            *SHORT,
+            "--out",
+            str(path),
+            "--trigger",
+            "RFR<1",
+        )
+        with served([*DRIVEPANEL, *command], ready="RFR 0 < 1") as recording:
+            status, _ = recording.end(signal.SIGINT)
+    assert status == 130
+    assert rows(path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (("RFR", "--out", "there.sqlite"), "there.sqlite already exists"),
+        (("RFR", "--out", "new.sqlite", "--trigger", "faults"), "'faults' is not a trigger"),
+        (("RFR", "--out", "new.sqlite", "--count", "1"), "--count requires --trigger"),
+        (("XYZQ", "--out", "new.sqlite"), "no parameter 'XYZQ'"),
+        (("RFR", "--out", "none/new.sqlite/x"), "none"),
+    ],
+)
+def test_refused_recording_writes_no_file(
+    arguments: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "there.sqlite").write_text("mine")
+    (tmp_path / "none").write_text("")
+    done = ended(2, "record", "sim:atv71", *arguments)
+    assert text in done.stderr
+    assert (tmp_path / "there.sqlite").read_text() == "mine"
+    assert not (tmp_path / "new.sqlite").exists()
+
+
+def test_drive_that_does_not_answer_ends_with_3_and_keeps_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "values.sqlite"
+    path.write_text("mine")
+    ended(3, "record", "sim:atv71@2", "-d", "9", "RFR", "--out", path, "--force")
+    assert path.read_text() == "mine"

@@ -1,0 +1,1 @@
+"""Recordings of named codes, always or around triggers."""
