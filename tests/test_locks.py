@@ -153,18 +153,28 @@ def test_threads_do_not_block_the_exit() -> None:
     assert keeping == {"cli/shared/signals.py", "terminal/last_words.py"}
 
 
-def _name_of(call: ast.Call) -> ast.expr | None:
-    """The name that a call gives a thread, a worker or a task."""
+NAME_ARGUMENT = {"Thread": 2, "spawn": 1}
+"""Index of the name among the positional arguments, of a thread and of a worker."""
+
+
+def _name_of(call: ast.Call, place: int) -> ast.expr | None:
+    """The name that a call gives a thread or a worker, by keyword or at `place`."""
     named = [word.value for word in call.keywords if word.arg == "name"]
-    return named[0] if named else call.args[1] if len(call.args) > 1 else None
+    return named[0] if named else call.args[place] if len(call.args) > place else None
 
 
-@pytest.mark.parametrize("begins", ["Thread", "spawn"])
+def test_target_of_a_thread_is_not_its_name() -> None:
+    call = ast.parse("Thread(None, work)", mode="eval").body
+    assert isinstance(call, ast.Call)
+    assert _name_of(call, NAME_ARGUMENT["Thread"]) is None
+
+
+@pytest.mark.parametrize("begins", NAME_ARGUMENT)
 def test_each_thread_and_worker_has_a_name_for_the_log(begins: str) -> None:
     calls = [(path, call) for path, call in calls_of(begins) if path.name != "fake.py"]
     assert len(calls) > 5
     for path, call in calls:
-        name = _name_of(call)
+        name = _name_of(call, NAME_ARGUMENT[begins])
         is_empty = name is None or (isinstance(name, ast.Constant) and not name.value)
         assert not is_empty, f"{path}:{call.lineno}"
 

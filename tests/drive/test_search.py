@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -23,7 +24,7 @@ from tui.drive.profile.search import (
     plain_letters,
     search_words,
 )
-from tui.drive.profile.search_file import Topic, Vocabulary, read_vocabulary
+from tui.drive.profile.search_file import Vocabulary, read_vocabulary
 from tui.drive.settings.selection import FilterContext, rows
 
 FOLDER = library.packaged_folder() / "search"
@@ -254,12 +255,21 @@ def test_packaged_words_of_codes_that_an_own_edition_lacks_are_skipped() -> None
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-def test_packaged_words_fit_their_family(family: str) -> None:
-    data = library.load(family).data
-    words = read_vocabulary(data, (FOLDER.parent,))
-    assert isinstance(words.topics[0], Topic)
-    assert all(topic.words for topic in words.topics)
-    ParameterSearch(library.load(family), Vocabulary(words.topics))  # works without synonyms
+def test_each_word_of_a_topic_finds_its_first_parameter(family: str) -> None:
+    profile = library.load(family)
+    topics = [
+        topic for topic in read_vocabulary(profile.data, (FOLDER.parent,)).topics if topic.codes
+    ]
+    assert topics
+    without_synonyms = ParameterSearch(profile, Vocabulary(tuple(topics)))
+    for search in (parameter_search(profile), without_synonyms):
+        missed = [
+            (topic.id, word)
+            for topic in topics
+            for word in topic.words
+            if topic.codes[0] not in search.scores(word)
+        ]
+        assert missed == []
 
 
 def test_each_topic_finds_a_parameter_and_is_defined_once() -> None:
@@ -300,6 +310,11 @@ def test_committed_schema_of_words_is_up_to_date() -> None:
 
 def test_document_names_every_field_of_words() -> None:
     text = (FOLDER.parent / "README.md").read_text("utf-8")
-    kinds = (SearchTopic, SearchWords, FamilyTopic, FamilySearch)
-    fields = {field.name for kind in kinds for field in msgspec.structs.fields(kind)}
-    assert [name for name in sorted(fields) if f"`{name}`" not in text] == []
+    section = text.partition("## The words of a search\n")[2].partition("\n## ")[0]
+    shared, family = section.split("A file `search/ID.toml`")
+    for part, kinds in (
+        (shared, (SearchTopic, SearchWords)),
+        (family, (FamilyTopic, FamilySearch)),
+    ):
+        fields = {field.name for kind in kinds for field in msgspec.structs.fields(kind)}
+        assert [name for name in sorted(fields) if not re.search(rf"`(\[\[)?{name}\b", part)] == []
