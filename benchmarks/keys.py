@@ -25,8 +25,8 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from tests.line.terminal import Terminal, runs
-from tests.programs import kill_keepers, wait_until
+from tests.line.terminal import Terminal
+from tests.programs import is_running, kill_keepers, wait_until
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
@@ -162,7 +162,7 @@ def main() -> None:
             # a failed task leaves the panel open; it and the keeper write into the folder
             with suppress(subprocess.CalledProcessError):
                 terminal.run("kill-server")
-            wait_until(lambda: not runs(panel), "the end of the panel")
+            wait_until(lambda: not is_running(panel), "the end of the panel")
             kill_keepers(Path(folder) / "lines")
     table = Table("task", "keys", "s")
     for name, figures in found.items():

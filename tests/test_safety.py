@@ -168,7 +168,7 @@ def test_start_waits_five_seconds_for_the_disk() -> None:
 # Programs on a line
 
 
-class Loop:
+class PausedTime:
     """Time in which programs may come back."""
 
     def __init__(self) -> None:
@@ -183,8 +183,8 @@ class Loop:
 
 
 def test_programs_have_two_to_six_seconds_to_reconnect() -> None:
-    assert 1.7 < Loop().waited(greets=False) < 2.3
-    assert 5.7 < Loop().waited(greets=True) < 6.3
+    assert 1.7 < PausedTime().waited(greets=False) < 2.3
+    assert 5.7 < PausedTime().waited(greets=True) < 6.3
 
 
 def client(heard: float = 0.0) -> Client:

@@ -125,6 +125,11 @@ class Peer:
         """The requests to one device so far."""
         return [request for request in self.requests if request[0] == device]
 
+    @property
+    def words_written(self) -> list[tuple[int, int]]:
+        """Device and word of each write of one word that arrived."""
+        return [(r[0], int.from_bytes(r[4:6], "big")) for r in self.requests if r[1] == 6]
+
     def await_requests(self, count: int, seconds: float = 5.0) -> None:
         """Wait until this many requests have arrived."""
         eventually(lambda: len(self.requests) >= count, seconds)

@@ -40,8 +40,8 @@ def slow(request: bytes, _count: int) -> Sequence[Step]:
 
 
 def written(peer: PtyPeer) -> list[int]:
-    """The value of every single write on the wire."""
-    return [request[5] for request in peer.requests if request[1] == 6]
+    """The word of every single write on the wire."""
+    return [word for _, word in peer.words_written]
 
 
 async def refusal(line: Line) -> str:

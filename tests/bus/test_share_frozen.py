@@ -24,11 +24,6 @@ from .sharing import frozen, knows
 RUN, OTHER = 15, 4
 
 
-def written(peer: PtyPeer) -> list[tuple[int, int]]:
-    """Device and value of every single write on the wire."""
-    return [(request[0], request[5]) for request in peer.requests if request[1] == 6]
-
-
 async def come(condition: Callable[[], bool]) -> None:
     """Wait for something while the test's own tasks go on."""
     await asyncio.to_thread(eventually, condition)
@@ -59,7 +54,7 @@ async def test_frozen_client_counts_as_gone_and_loses_its_drives(
             await run
         await come(lambda: denied == [f"1: {STOOD_STILL}"])
         await come(lambda: knows(owner, "run"))
-        assert written(peer) == [(1, OTHER)]
+        assert peer.words_written == [(1, OTHER)]
         await come(lambda: other.facts.commander(1) == third.facts.me)
         assert (await other.read(1, 5)).words == (5,)
 

@@ -32,11 +32,6 @@ def slow(request: bytes, _count: int) -> Sequence[Step]:
     return [0.1, reply(request)]
 
 
-def written(peer: PtyPeer) -> list[tuple[int, int]]:
-    """Device and value of every single write on the wire."""
-    return [(request[0], request[5]) for request in peer.requests if request[1] == 6]
-
-
 NOT_ENDED = r"does not answer\. End that program \(kill -9 \d+\)"
 
 
@@ -84,7 +79,7 @@ async def test_stop_discards_pending_work_for_its_drive_only(
         for task in runs:
             assert "a stop came after it (the stop key" in await refused(task)
         await asyncio.gather(reading, *stops, *others)
-        assert written(peer) == [(1, STOP), (2, RUN), (2, RUN), (2, RUN)]
+        assert peer.words_written == [(1, STOP), (2, RUN), (2, RUN), (2, RUN)]
         # later writes are sent
         eventually(lambda: all(program.facts.stops.stamp(1) == 1 for program in programs))
         for program in programs:
@@ -149,7 +144,7 @@ async def test_write_typed_before_a_stop_is_refused_after_it(
             await asyncio.sleep(0.02)
             await asyncio.gather(*stop(owner, 1))
         assert "a stop came after it" in await refused(run)
-        assert written(peer) == [(1, STOP)]
+        assert peer.words_written == [(1, STOP)]
 
 
 async def test_stops_of_two_disconnected_programs_both_count(share: Share) -> None:
@@ -169,7 +164,7 @@ async def test_stops_of_two_disconnected_programs_both_count(share: Share) -> No
         with pytest.raises(LineError):
             await run
         eventually(lambda: [line.facts.stops.stamp(1) for line in (first, second)] == [2, 2])
-        assert written(peer) == []
+        assert peer.words_written == []
 
 
 async def test_stop_given_while_disconnected_is_reported_on_reconnecting(share: Share) -> None:
@@ -230,13 +225,13 @@ async def test_stop_waits_for_a_frozen_owner_and_cancels_earlier_writes(
             assert time.monotonic() - begun < HEARD_WITHIN
             assert "owns the line and does not answer. End that program" in other.state.reason
             assert other.state.status is LineStatus.LOST
-            assert written(peer) == []
+            assert peer.words_written == []
         for run in runs:
             assert "Not sent" in await refused(run)
         # it is sent automatically, once
-        eventually(lambda: written(peer) == [(1, STOP)])
+        eventually(lambda: peer.words_written == [(1, STOP)])
         await owner.write(2, 1, [RUN])
-        assert written(peer) == [(1, STOP), (2, RUN)]
+        assert peer.words_written == [(1, STOP), (2, RUN)]
         eventually(lambda: other.state.status is LineStatus.CONNECTED)
 
 
@@ -255,8 +250,8 @@ async def test_stop_kept_by_a_frozen_owner_is_sent_by_the_next(share: Share) -> 
             in_loop(owner, lambda: [item.writer.transport.abort() for item in server._all()])
             closing = asyncio.create_task(asyncio.to_thread(owner.close))
         await closing
-        await asyncio.to_thread(eventually, lambda: len(written(peer)) == 2)
-        assert sorted(written(peer)) == [(1, STOP), (2, STOP)]
+        await asyncio.to_thread(eventually, lambda: len(peer.words_written) == 2)
+        assert sorted(peer.words_written) == [(1, STOP), (2, STOP)]
 
 
 async def test_read_before_a_stop_fails_so_that_the_stop_is_sent(share: Share) -> None:
@@ -289,9 +284,9 @@ async def test_owner_counts_a_stop_of_a_program_that_has_exited(share: Share) ->
                 await send_stop(late, 1)
             late.close()
         assert "Not sent" in await refused(run)
-        eventually(lambda: written(peer) == [(1, STOP)])
+        eventually(lambda: peer.words_written == [(1, STOP)])
         await owner.write(1, 1, [RUN])
-        assert written(peer) == [(1, STOP), (1, RUN)]
+        assert peer.words_written == [(1, STOP), (1, RUN)]
 
 
 async def test_keeper_in_another_container_is_named_with_advice(share: Share) -> None:
@@ -317,7 +312,7 @@ async def test_request_for_frozen_owner_is_reported_and_not_sent_late(
             with pytest.raises(LineLost, match=NOT_ENDED):
                 await reading
         await other.read(1, 2)
-        assert written(peer) == []
+        assert peer.words_written == []
 
 
 async def test_command_delayed_by_a_frozen_owner_is_not_sent(
@@ -334,7 +329,7 @@ async def test_command_delayed_by_a_frozen_owner_is_not_sent(
         for run in runs:
             assert "was suspended for" in await refused(run)
         assert (await reading).words == (7,)
-        assert written(peer) == []
+        assert peer.words_written == []
 
 
 async def test_program_that_was_suspended_does_not_report_a_frozen_owner(share: Share) -> None:

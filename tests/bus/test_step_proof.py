@@ -155,7 +155,7 @@ async def test_stop_waits_for_one_request_of_a_proof_at_most(open_line: OpenLine
 
 def writes(peer: PtyPeer) -> list[int]:
     """The words that were written, in their order."""
-    return [int.from_bytes(request[4:6], "big") for request in peer.requests if request[1] == 6]
+    return [word for _, word in peer.words_written]
 
 
 async def test_stop_is_repeated_when_line_is_quiet(open_line: OpenLine) -> None:

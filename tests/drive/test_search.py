@@ -264,7 +264,7 @@ def test_each_word_of_a_topic_finds_its_first_parameter(family: str) -> None:
     without_synonyms = ParameterSearch(profile, Vocabulary(tuple(topics)))
     for search in (parameter_search(profile), without_synonyms):
         missed = [
-            (topic.id, word)
+            (topic.codes[0], word)
             for topic in topics
             for word in topic.words
             if topic.codes[0] not in search.scores(word)

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import time
-from contextlib import suppress
 from dataclasses import dataclass
-from pathlib import Path
 
 from tests.programs import PATIENCE, wait_until
 
@@ -54,10 +52,3 @@ class Terminal:
     def client(self) -> int:
         """Process id of the program in it: the SSH client."""
         return int(self.run("display-message", "-p", "#{pane_pid}"))
-
-
-def runs(pid: int) -> bool:
-    """True if a process runs; a zombie does not."""
-    with suppress(OSError):
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    return False

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 
 import pytest
 
-from tests.programs import DRIVEPANEL, drivepanel, served, wait_until
+from tests.programs import DRIVEPANEL, drivepanel, is_running, served, wait_until
 from tui.simulator import DriveSpec, Simulation
 
-from .terminal import Terminal, runs
+from .terminal import Terminal
 from .test_ways_to_end import running
 
 INSIDE = pytest.mark.usefixtures("held_inside")
@@ -42,7 +42,7 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
     with running(terminal_with) as made:
         made.simulation.drive(1).set("TTO", 300)
         os.kill(made.pid, signal.SIGKILL)
-        wait_until(lambda: not runs(made.pid), "the panel is gone")
+        wait_until(lambda: not is_running(made.pid), "the panel is gone")
         assert made.speed > 2
         terminal = again(second_terminal, made.line)
         terminal.wait_for("FORWARD", "Running since", "has exited", "T takes it over")
@@ -59,7 +59,7 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
         terminal.wait_for("A motor is running on your command")
         terminal.answer("s")
         made.stopped()
-        wait_until(lambda: not runs(terminal.client()), "the second panel ended")
+        wait_until(lambda: not is_running(terminal.client()), "the second panel ended")
 
 
 @INSIDE
@@ -67,7 +67,7 @@ def test_leaving_a_disowned_motor_asks_first(terminal_with: Start, second_termin
     """Its polls keep the drive alive: one q alone would let the motor coast later."""
     with running(terminal_with) as made:
         os.kill(made.pid, signal.SIGKILL)
-        wait_until(lambda: not runs(made.pid), "the panel is gone")
+        wait_until(lambda: not is_running(made.pid), "the panel is gone")
         terminal = again(second_terminal, made.line)
         terminal.wait_for("FORWARD", "Running since")
         terminal.press("q")
@@ -83,7 +83,7 @@ def test_observed_standstill_withdraws_the_offer(
 ) -> None:
     with running(terminal_with) as made:
         os.kill(made.pid, signal.SIGKILL)
-        wait_until(lambda: not runs(made.pid), "the panel is gone")
+        wait_until(lambda: not is_running(made.pid), "the panel is gone")
         terminal = again(second_terminal, made.line)
         terminal.wait_for("FORWARD", "Running since")
         terminal.press("Space")

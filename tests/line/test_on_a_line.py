@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from tests.waiting import until
 from tui.bus.api import Priority
 from tui.bus.errors import (
     LineBusy,
@@ -49,13 +50,6 @@ def five() -> Iterator[OpenLine]:
 
 def session(opened: OpenLine, profile: str) -> DriveSession:
     return DriveSession(opened.line, ADDRESSES[profile], library.load(profile))
-
-
-async def until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it did not come to that"
-        await asyncio.sleep(0.02)
 
 
 @pytest.mark.parametrize(

@@ -16,13 +16,22 @@ from pathlib import Path
 
 import pytest
 
-from tests.programs import DRIVEPANEL, PATIENCE, Served, drivepanel, end_keepers, served, wait_until
+from tests.programs import (
+    DRIVEPANEL,
+    PATIENCE,
+    Served,
+    drivepanel,
+    end_keepers,
+    is_running,
+    served,
+    wait_until,
+)
 from tui.bus.program import Program
 from tui.bus.share.messages import VERSION, Hello, packed
 from tui.bus.share.place import short_path
 from tui.simulator import DriveSpec, Simulation
 
-from .terminal import Terminal, runs
+from .terminal import Terminal
 from .test_commands import bench, stands, turns
 from .test_ways_to_end import Running
 from .test_ways_to_end import running as panel_running
@@ -375,7 +384,7 @@ def test_stop_in_one_panel_stops_the_motor_of_the_other(
         made.stopped()
         made.terminal.wait_for("STANDBY", "Stop from panel")
         other.wait_for("STANDBY")
-        assert runs(made.pid)
+        assert is_running(made.pid)
 
 
 @pytest.mark.usefixtures("holder")

@@ -15,12 +15,11 @@ from typing import Any
 
 import pytest
 
-from tests.programs import DRIVEPANEL, PATIENCE, served, wait_until
+from tests.programs import DRIVEPANEL, PATIENCE, is_running, served, wait_until
 from tui.session.signals import OF_ERRORS, SUSPENDING, UNTOUCHED, ending_signals, signal_name
 from tui.simulator import DriveSpec, Simulation
 
 from .pty_panel import PtyPanel, panel_on_a_pty, start_panel
-from .terminal import runs
 
 FROM_OUTSIDE = [int(getattr(signal, name)) for name in OF_ERRORS]
 """Signals of errors, sent by another program."""
@@ -47,7 +46,7 @@ def looked_at(pid: int, terminal: int) -> PtyPanel:
 
 def ended(panel: PtyPanel) -> None:
     """Wait until the program has ended; take what it prints until then."""
-    wait_until(lambda: (panel.look(), not runs(panel.pid))[1], "the program ended")
+    wait_until(lambda: (panel.look(), not is_running(panel.pid))[1], "the program ended")
 
 
 def test_every_signal_of_the_system_has_one_treatment() -> None:

@@ -23,10 +23,10 @@ from pathlib import Path
 import pytest
 
 from tests.conftest import need_peer
-from tests.programs import PATIENCE, free_port, port_of, simulated, wait_until
+from tests.programs import PATIENCE, free_port, is_running, port_of, simulated, wait_until
 
 from .conftest import Peer
-from .terminal import Terminal, runs
+from .terminal import Terminal
 
 ROOT = Path(__file__).resolve().parents[2]
 STALL = 10.0
@@ -115,7 +115,7 @@ def test_demo_runs_over_ssh(
     terminal.wait_for("Quit the panel?", "Device 1, Altivar 21: on loss of communication")
     terminal.answer("y")
     pid = int((tmp_path / "pid").read_text())
-    wait_until(lambda: not runs(pid), "the panel left on its key")
+    wait_until(lambda: not is_running(pid), "the panel left on its key")
 
 
 SETTLED = 0.5
@@ -154,7 +154,7 @@ def test_blocked_terminal_does_not_stop_polling(
         terminal.wait_for("Quit the panel?")  # its drive acts on the timeout
         time.sleep(SETTLED)
         terminal.press("y")
-        wait_until(lambda: not runs(panel), "the panel left on its keys")
+        wait_until(lambda: not is_running(panel), "the panel left on its keys")
 
 
 class Counter:

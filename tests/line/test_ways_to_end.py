@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import pytest
 
-from tests.programs import wait_until
+from tests.programs import is_running, wait_until
 from tui.simulator import DriveSpec, Simulation
 
-from .terminal import Terminal, runs
+from .terminal import Terminal
 
 Start = Callable[[list[str]], Terminal]
 
@@ -32,7 +32,7 @@ class Running(NamedTuple):
         return self.simulation.drive(1).motor.frequency
 
     def ended(self) -> None:
-        wait_until(lambda: not runs(self.pid), "the panel ended")
+        wait_until(lambda: not is_running(self.pid), "the panel ended")
 
     def stopped(self) -> None:
         wait_until(lambda: self.speed == 0, "the motor stopped")

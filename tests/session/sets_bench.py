@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from tests.programs import wait_until
+from tests.sent import words_written
 from tui.bus.api import LineStatus
 from tui.bus.errors import DeviceException, LineError
 from tui.bus.line import Line
@@ -109,9 +110,7 @@ class Bench:
 
     def writes(self) -> list[tuple[int, int]]:
         """Registers and words of all writes of one word so far."""
-        line = self.session.line
-        sent = [f.data for f in line.trace if f.direction == "out" and f.data[1] == 6]
-        return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
+        return words_written(self.session.line)
 
     def lose_line(self) -> None:
         """Unplug the adapter, and wait until the line notices."""

@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from tests.waiting import until
 from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer, RequestRefused
 from tui.drive.profile import library
@@ -94,10 +95,3 @@ class SlowBench:
         """Write all pending records."""
         self.starts.close(5.0)
         self.journal.close()
-
-
-async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it did not come to that"
-        await asyncio.sleep(0.005)

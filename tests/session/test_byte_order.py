@@ -9,6 +9,7 @@ from itertools import product
 
 import pytest
 
+from tests.sent import words_written
 from tests.sweeps import kept
 from tui.bus.api import Priority
 from tui.bus.errors import BytesSwapped
@@ -33,7 +34,7 @@ from tui.session.work import Permit
 from tui.simulator import DriveSpec, FaultRates, Simulation
 
 from .sets_bench import FAMILIES
-from .test_stop import wait_for, writes
+from .test_stop import wait_for
 
 SWAPPED = FaultRates(swapped=1.0)
 HEALTHY = FaultRates()
@@ -92,7 +93,7 @@ async def test_swapped_bytes_refuse_arming_and_disarm() -> None:
             permit.check()
         with pytest.raises(OrderRefused, match="arrive swapped"):
             session.arming.arm()
-        assert writes(line) == []
+        assert words_written(line) == []
 
 
 @pytest.mark.parametrize("kind", LINES)
@@ -147,7 +148,7 @@ async def test_recovered_line_is_checked_again_before_a_command() -> None:
         assert not session.arming.armed
         with pytest.raises(BytesSwapped):
             await RetryingReader(session).ask(["ACC"])
-        assert writes(line) == []
+        assert words_written(line) == []
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -159,8 +160,8 @@ async def test_stop_with_swapped_bytes_is_sent_but_never_reported_as_done(family
         await wait_for(lambda: bool(stopper.reports) and stopper.reports[1].phase is Phase.FAILED)
         assert "arrive swapped" in stopper.reports[1].text
         chart, order = stop_in_any(session.profile, {})
-        assert writes(line)
-        assert {word for _, word in writes(line)} <= {
+        assert words_written(line)
+        assert {word for _, word in words_written(line)} <= {
             *(word & 0xFFFF for word in order.words),
             *(word & 0xFFFF for o in chart.orders if o.id == "stop" for word in o.words),
         }
@@ -172,7 +173,7 @@ async def test_stop_with_swapped_bytes_never_uses_the_word_of_another_chart() ->
         stopper = Stopper(line, Journal())
         stopper.stop([session])
         await wait_for(lambda: bool(stopper.reports) and stopper.reports[1].phase is Phase.FAILED)
-        assert {word for _, word in writes(line)} == {0}
+        assert {word for _, word in words_written(line)} == {0}
         assert simulation.drive(1).motor.frequency == 0
 
 

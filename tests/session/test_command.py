@@ -14,7 +14,9 @@ from typing import NamedTuple
 import pytest
 
 from tests.limits import ARMED_FOR
+from tests.sent import words_written
 from tests.session.sets_bench import state_known
+from tests.waiting import until
 from tui.bus.line import Line, Timing
 from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused
@@ -84,10 +86,7 @@ class Bench(NamedTuple):
         await let_go_until(self.clock, holds)
 
     async def until(self, holds: Callable[[], bool], seconds: float = 60.0) -> None:
-        end = time.monotonic() + seconds
-        while not holds():
-            assert time.monotonic() < end, "it did not come to that"
-            await asyncio.sleep(0.01)
+        await until(holds, seconds)
 
     @property
     def stopped(self) -> bool:
@@ -96,8 +95,7 @@ class Bench(NamedTuple):
         return report is not None and report.phase is Phase.STOPPED
 
     def writes(self) -> list[tuple[int, int]]:
-        sent = [f.data for f in self.line.trace if f.direction == "out" and f.data[1] == 6]
-        return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
+        return words_written(self.line)
 
 
 @asynccontextmanager

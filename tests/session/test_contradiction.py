@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from tests.sent import words_written
 from tui.bus.api import IdentificationObjects, Priority
 from tui.bus.errors import ChecksumFault, DeviceException, LineLost, NoAnswer, WrongReply
 from tui.drive.orders import OrderRefused
@@ -22,9 +23,9 @@ from tui.session.journal import Journal
 from tui.simulator import DriveSpec
 
 from .fakes import OneDrive, parameter, profile_of
-from .test_stop import Start, ended, journal, start, wait_for, writes
+from .test_stop import Start, ended, start, wait_for
 
-__all__ = ["journal", "start"]
+__all__ = ["start"]
 
 
 def output(reference: str) -> DriveIdentity:
@@ -163,10 +164,10 @@ async def test_contradicting_drive_is_stopped_by_its_own_family(
         await line.write(1, address, [word])
     await wait_for(lambda: drive.motor.frequency > 15)
     session = DriveSession(line, 1, library.load("atv312"), identity)
-    sent = len(writes(line))
+    sent = len(words_written(line))
     stopper = Stopper(line, journal)
     for _ in range(2):
         stopper.stop([session])
         assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert {word for address, word in writes(line)[sent:] if address == 8501} == {0x0000}
+    assert {word for address, word in words_written(line)[sent:] if address == 8501} == {0x0000}
     assert drive.motor.frequency == 0

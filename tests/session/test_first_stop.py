@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from tests.sent import words_written
 from tui.bus.line import Line
 from tui.drive.profile import library
 from tui.drive.profile.stop_profile import stop_profile
@@ -13,9 +14,9 @@ from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.troubles import FaultRates
 
-from .test_stop import FAMILIES, WORDS, Start, journal, start, wait_for, writes
+from .test_stop import FAMILIES, WORDS, Start, start, wait_for
 
-__all__ = ["journal", "start"]
+__all__ = ["start"]
 FACTS = stop_profile()
 PLACES = {0xFA00, 8501, 641}
 
@@ -60,8 +61,8 @@ async def test_first_stop_stops_each_family_before_identification(
     assert 43 not in {frame[1] for frame in frames(line)}
     await wait_for(lambda: simulation.drive(1).motor.frequency == 0)
     # a wrongly named family is excluded by its status word, or gets no word
-    assert writes(line)[-1] == WORDS[family]
-    others = {address for address, _ in writes(line)} - {WORDS[family][0]}
+    assert words_written(line)[-1] == WORDS[family]
+    others = {address for address, _ in words_written(line)} - {WORDS[family][0]}
     assert others <= ({8501} if named == "atv312" else set())
 
 
@@ -100,7 +101,7 @@ async def test_no_blind_word_is_sent_without_a_named_family(start: Start, journa
     silence(simulation)
     sent = await first(line, journal)
     assert (sent.sent, sent.answered) == ((), False)
-    assert writes(line) == []
+    assert words_written(line) == []
 
 
 async def test_named_drive_is_stopped_by_a_word_that_starts_no_other(
@@ -111,7 +112,7 @@ async def test_named_drive_is_stopped_by_a_word_that_starts_no_other(
     silence(simulation)
     sent = await first(line, journal, "atv312")
     assert (sent.taken, sent.answered) == (None, False)
-    assert writes(line) == [(8501, 0x0000)]
+    assert words_written(line) == [(8501, 0x0000)]
     assert journal.recent[-1].answer != "ok"
     # the replies were lost, not the word
     await wait_for(lambda: simulation.drive(1).motor.frequency == 0)
@@ -122,5 +123,5 @@ async def test_first_stop_uses_no_register_the_drive_does_not_have(
 ) -> None:
     _, line = start(running("atv21"))
     sent = await first(line, journal, "atv71")
-    assert writes(line) == [WORDS["atv21"]]
+    assert words_written(line) == [WORDS["atv21"]]
     assert {"atv71", "powerdrive"} <= sent.ruled_out

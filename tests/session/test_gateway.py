@@ -29,9 +29,9 @@ from tui.session.gateway.writes import ENDED_BEFORE_ANSWER
 from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
 
-from .test_stop import Start, journal, start, wait_for
+from .test_stop import Start, start, wait_for
 
-__all__ = ["journal", "start"]
+__all__ = ["start"]
 
 ATV71 = library.load("atv71")
 CMD, LFR, ETA, ACC = 8501, 8502, 3201, 9001

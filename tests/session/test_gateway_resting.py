@@ -16,9 +16,9 @@ from tui.session.starts.record import StartNotRecorded
 from tui.simulator import DriveSpec
 
 from .test_gateway import CMD, LFR, Bench, Make, bench, start_motor
-from .test_stop import journal, start, wait_for
+from .test_stop import start, wait_for
 
-__all__ = ["bench", "journal", "start"]
+__all__ = ["bench", "start"]
 
 TIMEOUT = 2.0
 ALTIVAR_71 = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": round(10 * TIMEOUT)})

@@ -27,10 +27,6 @@ from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.server.conversation import RtuConversation
 
-from .test_stop import journal
-
-__all__ = ["journal"]
-
 ETA, CMD, ACC, CHCF = 3201, 8501, 9001, library.load("atv71")["CHCF"].address
 STOP = struct.pack(">BHH", 6, CMD, 0x0007)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.sent import words_written
 from tui.bus.fake import FakeLine
 from tui.bus.requests import WriteOne
 from tui.drive.profile import library
@@ -21,9 +22,9 @@ from tui.session.starts.keeper import StartKeeper
 from tui.session.starts.starts import Starts
 from tui.simulator import DriveSpec
 
-from .test_stop import WORDS, Start, ended, journal, start, wait_for, writes
+from .test_stop import WORDS, Start, ended, start, wait_for
 
-__all__ = ["journal", "start"]
+__all__ = ["start"]
 LEROY_SOMER = ("powerdrive", "proxidrive", "varmeca")
 PUMP = Path(__file__).parent.parent / "drive" / "pump.toml"
 STATUS, COMMAND = 1039, 641
@@ -45,7 +46,7 @@ async def test_stop_of_a_guessed_drive_sends_its_word_and_reports_not_stopped(
     fleet.take(session, guessed=True)
     fleet.stop([session])
     report = await ended(fleet.stopper, 1)
-    assert writes(line)[0] == WORDS["powerdrive"]
+    assert words_written(line)[0] == WORDS["powerdrive"]
     assert drive.motor.frequency == 0
     assert report.phase is Phase.FAILED
     assert report.text == (

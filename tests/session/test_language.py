@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -39,13 +39,6 @@ FIELDS = profile_of(
     parameter("AMPS", 11, function=4, access="r", type="int16"),
     functions=FUNCTIONS,
 )
-
-
-@pytest.fixture
-def journal() -> Iterator[Journal]:
-    made = Journal()
-    yield made
-    made.close()
 
 
 def armed(line: OneDrive, profile: Profile) -> DriveSession:

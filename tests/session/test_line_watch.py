@@ -11,6 +11,7 @@ from typing import Any, cast
 
 import pytest
 
+from tests.waiting import until
 from tui.bus.api import DeviceState, LineWorker, Priority
 from tui.bus.keep_alive import KeepAlive
 from tui.session.drive import DriveSession
@@ -67,13 +68,6 @@ class BackgroundListener(OneDrive):
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
         self.workers.append(super().spawn(work, name))
         return self.workers[-1]
-
-
-async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it did not come to that"
-        await asyncio.sleep(0.005)
 
 
 class Kept:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import pytest
 
+from tests.waiting import until
 from tui.drive.profile import library
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.load import share_of_limit
 from tui.session.monitor.monitor import Monitor
-
-from ..line.test_on_a_line import until
 
 
 @pytest.mark.parametrize(("family", "limit"), [("atv71", "INV"), ("atv21", ""), ("powerdrive", "")])

@@ -6,12 +6,14 @@ import asyncio
 import math
 import threading
 import time
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
 
+from tests.sent import words_written
+from tests.waiting import until
 from tui.bus.api import ModbusLine, Reply
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Line
@@ -27,13 +29,6 @@ from tui.session.read.reader import Reader
 from tui.session.work import OutcomeKind
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
-
-
-async def until(holds: Callable[[], object], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it did not come to that"
-        await asyncio.sleep(0.01)
 
 
 class Bench:
@@ -58,8 +53,7 @@ class Bench:
 
     def writes(self) -> list[tuple[int, int]]:
         """Register and word of every write of one word so far."""
-        sent = [f.data for f in self.line.trace if f.direction == "out" and f.data[1] == 6]
-        return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
+        return words_written(self.line)
 
 
 @asynccontextmanager

@@ -8,8 +8,9 @@ from pathlib import Path
 from types import FrameType
 
 from tests.sources import PACKAGE, ROOT
+from tests.waiting import until
 
-from .slow_drive import COMMAND, SlowBench, until
+from .slow_drive import COMMAND, SlowBench
 
 MOST_HOPS = 12
 HEADING = "## The key `r`, from the screen to the frame"

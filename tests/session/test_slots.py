@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -14,6 +14,7 @@ import pytest_asyncio
 
 from tests.blocks import block_of
 from tests.programs import rtu_tcp
+from tests.waiting import until
 from tui.bus.api import ModbusLine, Priority
 from tui.bus.fake import FakeLine
 from tui.drive.profile import library
@@ -61,13 +62,6 @@ class Start(Protocol):
     def __call__(
         self, spec: DriveSpec, timing: LineTiming | None = None
     ) -> tuple[Simulation, OpenLine]: ...
-
-
-async def until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
-    end = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < end, "it did not come to that"
-        await asyncio.sleep(0.02)
 
 
 def scattered(count: int) -> dict[str, int]:

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from tests.waiting import until
 from tui.session.command import access, motor_start
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
 from tui.session.read.reader import Reader
 from tui.session.work import OutcomeKind
 
-from .slow_drive import ENABLED, READY, STATUS, SWITCHED_ON, SlowBench, until
+from .slow_drive import ENABLED, READY, STATUS, SWITCHED_ON, SlowBench
 
 
 @pytest.fixture(autouse=True)

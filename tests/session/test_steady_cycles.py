@@ -9,6 +9,7 @@ from contextlib import suppress
 
 import pytest
 
+from tests.waiting import until
 from tui.bus.errors import LineError, NoAnswer, RequestRefused
 from tui.bus.model import Reply
 from tui.bus.poll_plan import PlannedRead, PolledTurn, PollPlan, Subscription
@@ -110,10 +111,7 @@ class Steady:
         self.monitor.listen(self.snapshots.append)
 
     async def until(self, holds: Callable[[], bool]) -> None:
-        end = time.monotonic() + PATIENCE
-        while not holds():
-            assert time.monotonic() < end, "it did not come to that"
-            await asyncio.sleep(0.002)
+        await until(holds, PATIENCE)
 
     async def start(self, period: float = 0.01) -> None:
         self.monitor.start(period=period)

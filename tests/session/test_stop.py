@@ -11,6 +11,7 @@ from typing import cast
 
 import pytest
 
+from tests.sent import words_written
 from tui.bus.api import Priority
 from tui.bus.fake import FakeLine
 from tui.bus.line import Line
@@ -49,14 +50,6 @@ def start(journal: Journal) -> Iterator[Start]:
         simulation.stop()
 
 
-@pytest.fixture
-def journal() -> Iterator[Journal]:
-    """A journal in the test's own folder."""
-    made = Journal()
-    yield made
-    made.close()
-
-
 async def ended(stopper: Stopper, device: int, clock: FakeClock | None = None) -> StopReport:
     """Report of an ended stop; with a clock, its time is advanced."""
 
@@ -66,16 +59,6 @@ async def ended(stopper: Stopper, device: int, clock: FakeClock | None = None) -
 
     await let_go_until(clock or FakeClock(), over)
     return stopper.reports[device]
-
-
-def writes(line: Line) -> list[tuple[int, int]]:
-    """Register and word of every write that was sent."""
-    sent = [frame.data for frame in line.trace if frame.direction == "out"]
-    return [
-        (int.from_bytes(data[2:4], "big"), int.from_bytes(data[4:6], "big"))
-        for data in sent
-        if data[1] == 6
-    ]
 
 
 WORDS = {
@@ -97,8 +80,8 @@ async def test_every_family_stops_on_its_ramp(start: Start, journal: Journal, fa
     await wait_for(lambda: drive.motor.frequency > 5)
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load(family))])
-    await wait_for(lambda: bool(writes(line)))
-    assert writes(line)[0] == WORDS[family]
+    await wait_for(lambda: bool(words_written(line)))
+    assert words_written(line)[0] == WORDS[family]
     seen: list[float] = []
     while stopper.reports[1].phase not in (Phase.STOPPED, Phase.FAILED):
         seen.append(abs(drive.motor.frequency))
@@ -125,7 +108,7 @@ async def test_altivar_71_in_the_io_profile_gets_no_drivecom_word(
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("atv71"))])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert writes(line) == [(8501, 0x0000)]
+    assert words_written(line) == [(8501, 0x0000)]
     assert drive.motor.frequency == 0
 
 
@@ -136,7 +119,7 @@ async def test_profile_without_a_known_stop_is_reported(start: Start, journal: J
     report = await ended(stopper, 1)
     assert report.phase is Phase.FAILED
     assert "at the machine" in report.text
-    assert writes(line) == []
+    assert words_written(line) == []
 
 
 async def test_drive_with_dotd_at_freewheel_is_halted_instead(
@@ -149,7 +132,7 @@ async def test_drive_with_dotd_at_freewheel_is_halted_instead(
     stopper = Stopper(line, journal)
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert writes(line)[0] == (8501, 0x010F)
+    assert words_written(line)[0] == (8501, 0x010F)
 
 
 async def test_stop_does_not_unlock_a_leroy_somer(start: Start, journal: Journal) -> None:
@@ -157,7 +140,7 @@ async def test_stop_does_not_unlock_a_leroy_somer(start: Start, journal: Journal
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("powerdrive"))])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert writes(line) == [(641, 0x0000)]
+    assert words_written(line) == [(641, 0x0000)]
 
 
 async def test_stop_reports_a_drive_commanded_by_another_source(
@@ -178,7 +161,7 @@ async def test_stop_of_a_dead_drive_is_retried_and_reported(start: Start, journa
     stopper.stop([DriveSession(line, 9, library.load("atv21"))])
     report = await ended(stopper, 9)
     assert report.phase is Phase.FAILED
-    assert len(writes(line)) == 5
+    assert len(words_written(line)) == 5
 
 
 async def test_read_only_line_refuses_a_stop_with_a_reason(start: Start, journal: Journal) -> None:
@@ -306,7 +289,7 @@ async def test_held_stop_key_stops(start: Start, journal: Journal) -> None:
         # nothing is known of the drive: its words are read before one is chosen
         stopper.stop([session])
         await asyncio.sleep(0.001)
-        if writes(line):
+        if words_written(line):
             break
     else:
         raise AssertionError("no stop went out while the key was held")

@@ -6,12 +6,13 @@ from decimal import Decimal
 
 import pytest
 
+from tests.waiting import until
 from tui.drive.orders import nearest_stop
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 from tui.session.events import EventLog
 
-from .test_owners import bench, until
+from .test_owners import bench
 from .test_stop import FAMILIES
 
 

@@ -24,9 +24,9 @@ from tui.session.read.reader import Reader
 from tui.simulator import DriveSpec
 
 from .fake_clock import FakeClock
-from .test_stop import Start, ended, journal, start, wait_for
+from .test_stop import Start, ended, start, wait_for
 
-__all__ = ["journal", "start"]
+__all__ = ["start"]
 ENABLED, READY = 0x0637, 0x0631
 SEEN = {"atv71": {"CHCF": 1, "DOTD": 1, "ETA": ENABLED}}
 

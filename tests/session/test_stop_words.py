@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from tests.sent import words_written
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Reply
 from tui.drive.orders import OrderRefused, stop_in_any
@@ -26,9 +27,9 @@ from tui.simulator import DriveSpec
 
 from .fake_clock import FakeClock
 from .slow_drive import FREQUENCY, STATUS, SWITCHED_ON, SlowBench
-from .test_stop import Start, ended, journal, start, wait_for, writes
+from .test_stop import Start, ended, start, wait_for
 
-__all__ = ["journal", "start"]
+__all__ = ["start"]
 ATV71 = library.load("atv71")
 
 
@@ -48,11 +49,11 @@ async def test_refused_profile_write_does_not_change_the_stop_word(
     writer = Writer(session, journal, session.work.permit())
     with pytest.raises(DeviceException):
         await writer.write_parameter(ATV71["CHCF"], 1, why="setting")
-    sent = len(writes(line))
+    sent = len(words_written(line))
     stopper = Stopper(line, journal)
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert {word for address, word in writes(line)[sent:] if address == 8501} == {0x0000}
+    assert {word for address, word in words_written(line)[sent:] if address == 8501} == {0x0000}
     assert drive.motor.frequency == 0
 
 
@@ -69,7 +70,7 @@ async def test_value_changed_at_rest_is_read_again(start: Start, journal: Journa
     stopper = Stopper(line, journal)
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert writes(line) == [(8501, 0x0000)]
+    assert words_written(line) == [(8501, 0x0000)]
     assert session.reported_by_line, "a drive that watches from its first write on watches now"
 
 
@@ -111,7 +112,7 @@ async def test_unreadable_control_profile_gets_the_common_stop_word(
     stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, ATV71)])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert writes(line)[0] == (8501, 0x0000)
+    assert words_written(line)[0] == (8501, 0x0000)
     assert drive.motor.frequency == 0
 
 
@@ -150,7 +151,7 @@ async def test_halt_is_followed_by_disable_operation(start: Start, journal: Jour
     session = DriveSession(line, 1, ATV71)
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
-    assert [word for _, word in writes(line)] == [0x010F, 0x0007]
+    assert [word for _, word in words_written(line)] == [0x010F, 0x0007]
     await Reader(session).read(["ETA"])
     assert session.state(5.0).kind != "running"
 

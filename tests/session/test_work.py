@@ -29,7 +29,7 @@ from tui.session.work import (
 )
 
 
-class Loop(FakeLine):
+class LateCancelLine(FakeLine):
     """A line that does the work in the test's own loop, and may cancel it late."""
 
     cancels_late = False
@@ -61,7 +61,7 @@ class Notified:
     """A queue of an armed drive, and tasks that report their results."""
 
     def __init__(self) -> None:
-        self.line = Loop()
+        self.line = LateCancelLine()
         self.arming = Arming(self.line)
         self.arming.arm()
         self.queue = WorkQueue(self.line, 1, self.arming)

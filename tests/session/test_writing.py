@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
@@ -76,14 +76,6 @@ def session(line: WilfulLine) -> DriveSession:
     made = DriveSession(line, 1, PROFILE)
     made.arming.arm(seconds=math.inf)
     return made
-
-
-@pytest.fixture
-def journal() -> Iterator[Journal]:
-    """A journal in the test's own folder."""
-    made = Journal()
-    yield made
-    made.close()
 
 
 def writer(session: DriveSession, journal: Journal, permit: Permit | None = None) -> Writer:

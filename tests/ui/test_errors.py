@@ -5,12 +5,10 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from textual.events import Key
-from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
 from tui.bus.errors import PortBusy
@@ -19,7 +17,7 @@ from tui.session.connect.open_line import OpenLine, demo_line
 from tui.widgets.lines import Lines
 
 from . import fakes
-from .test_flows import alone
+from .test_flows import alone, until
 
 
 class Opener:
@@ -38,13 +36,6 @@ class Opener:
         opened.text = text
         opened.line.close = lambda: self.closed.append(text)  # type: ignore[method-assign]
         return opened
-
-
-async def until(pilot: Pilot[None], holds: Callable[[], bool]) -> None:
-    end = time.monotonic() + 60
-    while not holds():
-        assert time.monotonic() < end, "it never came"
-        await pilot.pause(0.05)
 
 
 def message(app: DrivePanelApp) -> str:
