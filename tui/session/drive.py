@@ -99,7 +99,7 @@ class DriveSession:
         """When it was last read in a state other than running or stopping (session's clock)."""
         self.edits_written = 0
         """Number of settings that edits of this program have written to it."""
-        self.stirs = 0
+        self.full_reads_requested = 0
         """Number of requests to re-read every value."""
         line.describe(device, limits_of(profile))
         self.note_profile()
@@ -177,7 +177,7 @@ class DriveSession:
 
     def request_full_read(self) -> None:
         """Make every monitor re-read the whole drive."""
-        self.stirs += 1
+        self.full_reads_requested += 1
 
     def note_state(self, kind: str, time: float) -> None:
         """Note the kind of state in which the drive was seen at a time (monotonic).

@@ -76,7 +76,7 @@ class Monitor:
         self._kind = "unknown"
         """Kind of the last state read."""
         self._all_due = True
-        self._stirs = 0
+        self._full_reads_done = 0
         self._learn_due = True
         self._trend = Trend(session.profile)
         self._notes = TrendNotes(session.line.facts, session.device, self._trend)
@@ -188,8 +188,8 @@ class Monitor:
                 error, contact = "", CONTACT_MADE
                 period = self._period(rates)
                 self.reader.max_age = period * SHARED_AGE
-                if self._all_due or self._stirs != self.session.stirs:
-                    self._stirs = self.session.stirs
+                if self._all_due or self._full_reads_done != self.session.full_reads_requested:
+                    self._full_reads_done = self.session.full_reads_requested
                     self._all_due, self._learn_due = False, True
                     due.add(rates.seldom)
                 try:
