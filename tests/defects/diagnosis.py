@@ -20,7 +20,7 @@ DEFECTS = (
     ),
     Defect(
         "echo-taken-for-an-answer",
-        "tui/session/diagnosis/heard.py",
+        "tui/session/diagnosis/reply_evidence.py",
         "        if not tcp and data == request:\n",
         "        if not tcp and data == asked:\n",
         "An adapter that repeats every frame is taken for the drive.",

@@ -55,8 +55,8 @@ from tui.session.diagnosis.asking import evidence_of_port, sight_of_drive
 from tui.session.diagnosis.diagnosis import LADDER, Diagnosis, diagnosed
 from tui.session.diagnosis.evidence import AdapterSeen, DiagnosticEvidence
 from tui.session.diagnosis.gateway_probe import Works
-from tui.session.diagnosis.heard import Heard, heard_by_errors
 from tui.session.diagnosis.measure import Measure
+from tui.session.diagnosis.reply_evidence import ReplyEvidence, evidence_of_errors
 from tui.wire.frames import frame
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
@@ -104,7 +104,7 @@ def of(sight: DiagnosticEvidence) -> Diagnosis:
 
 def heard(**seen: Any) -> DiagnosticEvidence:
     """Replies of a drive on a good port."""
-    return DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=3, **seen))
+    return DiagnosticEvidence(LINK, 2, PROFILE, heard=ReplyEvidence(requested=3, **seen))
 
 
 def test_garbage_at_the_same_baud_suggests_another_format() -> None:
@@ -211,10 +211,14 @@ def test_port_in_use_is_the_cause() -> None:
 
 def test_program_listening_on_the_port_is_named() -> None:
     seen = DiagnosticEvidence(
-        LINK, 2, PROFILE, port=PortSeen(PORT, others="cat (pid 3)"), heard=Heard(requested=2)
+        LINK,
+        2,
+        PROFILE,
+        port=PortSeen(PORT, others="cat (pid 3)"),
+        heard=ReplyEvidence(requested=2),
     )
     assert of(seen).text == f"cat (pid 3) has {PORT} open too, and takes what the drive answers."
-    assert of(replace(seen, heard=Heard(requested=5, answered=5))).well
+    assert of(replace(seen, heard=ReplyEvidence(requested=5, answered=5))).well
 
 
 @pytest.mark.parametrize(
@@ -272,7 +276,7 @@ def test_unreachable_host_is_the_cause() -> None:
 def test_latency_is_reported_if_set_and_measured(
     latency: int | None, turnaround: float, rung: str
 ) -> None:
-    heard = Heard(requested=5, answered=5)
+    heard = ReplyEvidence(requested=5, answered=5)
     port = PortSeen(PORT, latency=latency)
     found = of(DiagnosticEvidence(LINK, 2, PROFILE, port=port, heard=heard, turnaround=turnaround))
     assert found.rung == rung
@@ -322,7 +326,9 @@ async def test_bytes_at_another_baud_show_which(baud: int, line: OpenedLine) -> 
 
 def test_error_counts_of_a_port_show_wrong_settings() -> None:
     errors = PortErrors(framing=3, parity=1, breaks=2, overruns=0)
-    found = of(DiagnosticEvidence(LINK, 2, PROFILE, heard=Heard(requested=2), errors=errors))
+    found = of(
+        DiagnosticEvidence(LINK, 2, PROFILE, heard=ReplyEvidence(requested=2), errors=errors)
+    )
     assert found.rung == "wrong-settings"
     assert "3 without a stop bit, 1 with a wrong parity and 2 breaks" in found.text
 
@@ -346,7 +352,9 @@ async def test_error_counts_are_read_from_the_line() -> None:
 def test_unsupported_baud_of_the_family_is_the_cause(family: str) -> None:
     profile = library.load(family)
     found = of(
-        DiagnosticEvidence(SerialLink(PORT, 38400, "8N2"), 2, profile, heard=Heard(requested=2))
+        DiagnosticEvidence(
+            SerialLink(PORT, 38400, "8N2"), 2, profile, heard=ReplyEvidence(requested=2)
+        )
     )
     assert found.rung == "silence"
     assert found.steps[0].startswith("38400 bit/s does not work on ")
@@ -509,7 +517,7 @@ async def test_diagnosis_uses_operator_priority() -> None:
     ],
 )
 def test_results_of_requests_lead_to_their_check(error: LineError | None, rung: str) -> None:
-    heard = heard_by_errors([error, error], 2)
+    heard = evidence_of_errors([error, error], 2)
     assert of(DiagnosticEvidence(LINK, 2, PROFILE, heard=heard)).rung == rung
 
 
@@ -518,7 +526,9 @@ def test_results_of_requests_lead_to_their_check(error: LineError | None, rung: 
 
 def steps_in_silence(family: str, device: int = 2) -> str:
     link = SerialLink(PORT, 19200, "8E1")
-    found = of(DiagnosticEvidence(link, device, library.load(family), heard=Heard(requested=2)))
+    found = of(
+        DiagnosticEvidence(link, device, library.load(family), heard=ReplyEvidence(requested=2))
+    )
     assert found.rung == "silence"
     return "\n".join(found.steps)
 
@@ -555,7 +565,7 @@ def test_invalid_address_of_the_family_is_the_cause() -> None:
 
 def test_unsupported_format_of_the_family_is_the_cause() -> None:
     link = SerialLink(PORT, 19200, "8O2")
-    found = of(DiagnosticEvidence(link, 2, PROFILE, heard=Heard(requested=2)))
+    found = of(DiagnosticEvidence(link, 2, PROFILE, heard=ReplyEvidence(requested=2)))
     assert found.steps[0] == "Altivar 71 has no 8O2: it has 8O1, 8E1, 8N1, 8N2."
 
 
@@ -575,7 +585,9 @@ EXAMPLES = {
     "duplicated": replace(EVIDENCE, measure=Measure(requested=9, answered=9, duplicated=1)),
     "idle-close": replace(EVIDENCE, measure=Measure(requested=9, answered=9), idle_closed=True),
     "renumbered": replace(EVIDENCE, adapter=AdapterSeen("/dev/serial/by-id/a", "/dev/ttyUSB1")),
-    "changed": replace(EVIDENCE, changed="It was a pump.", heard=Heard(requested=5, answered=5)),
+    "changed": replace(
+        EVIDENCE, changed="It was a pump.", heard=ReplyEvidence(requested=5, answered=5)
+    ),
     "no-port": replace(EVIDENCE, trouble=PortMissing(PORT)),
     "no-permission": replace(EVIDENCE, port=PortSeen(PORT, permitted=False)),
     "busy": replace(EVIDENCE, trouble=PortBusy(PORT)),
@@ -585,19 +597,19 @@ EXAMPLES = {
     "slow-adapter": replace(
         EVIDENCE,
         port=PortSeen(PORT, latency=16),
-        heard=Heard(requested=5, answered=5),
+        heard=ReplyEvidence(requested=5, answered=5),
         turnaround=0.02,
     ),
-    "wrong-settings": replace(EVIDENCE, heard=Heard(requested=2, garbage=9)),
-    "silence": replace(EVIDENCE, heard=Heard(requested=2)),
-    "late": replace(EVIDENCE, heard=Heard(requested=2, late=1)),
-    "echo": replace(EVIDENCE, heard=Heard(requested=2, echoed=2)),
-    "checksum": replace(EVIDENCE, heard=Heard(requested=5, answered=3, damaged=2)),
-    "other-address": replace(EVIDENCE, heard=Heard(requested=2, others=(7,))),
-    "wrong-function": replace(EVIDENCE, heard=Heard(requested=2, functions=(4,))),
-    "gateway": replace(EVIDENCE, heard=Heard(requested=2, exceptions=(11, 11))),
-    "exception": replace(EVIDENCE, heard=Heard(requested=2, exceptions=(2, 2))),
-    "answers": replace(EVIDENCE, heard=Heard(requested=5, answered=5)),
+    "wrong-settings": replace(EVIDENCE, heard=ReplyEvidence(requested=2, garbage=9)),
+    "silence": replace(EVIDENCE, heard=ReplyEvidence(requested=2)),
+    "late": replace(EVIDENCE, heard=ReplyEvidence(requested=2, late=1)),
+    "echo": replace(EVIDENCE, heard=ReplyEvidence(requested=2, echoed=2)),
+    "checksum": replace(EVIDENCE, heard=ReplyEvidence(requested=5, answered=3, damaged=2)),
+    "other-address": replace(EVIDENCE, heard=ReplyEvidence(requested=2, others=(7,))),
+    "wrong-function": replace(EVIDENCE, heard=ReplyEvidence(requested=2, functions=(4,))),
+    "gateway": replace(EVIDENCE, heard=ReplyEvidence(requested=2, exceptions=(11, 11))),
+    "exception": replace(EVIDENCE, heard=ReplyEvidence(requested=2, exceptions=(2, 2))),
+    "answers": replace(EVIDENCE, heard=ReplyEvidence(requested=5, answered=5)),
     "not-open": EVIDENCE,
 }
 
@@ -624,12 +636,14 @@ CODES = st.lists(st.sampled_from([1, 2, 10, 11]), max_size=2).map(tuple)
 
 @given(
     st.builds(
-        Heard, requested=st.integers(1, 5), late=FEW, echoed=FEW, exceptions=CODES,
+        ReplyEvidence, requested=st.integers(1, 5), late=FEW, echoed=FEW, exceptions=CODES,
         functions=CODES, misshapen=FEW, others=CODES, damaged=FEW, garbage=FEW,
     ),
     st.sampled_from([*map(library.load, ("atv71", "powerdrive")), None]),
 )  # fmt: skip
-def test_silent_drive_is_never_reported_as_healthy(heard: Heard, profile: Profile | None) -> None:
+def test_silent_drive_is_never_reported_as_healthy(
+    heard: ReplyEvidence, profile: Profile | None
+) -> None:
     found = of(DiagnosticEvidence(LINK, 2, profile, heard=heard))
     assert found.rung not in ("answers", "not-open")
     assert found.steps

@@ -18,8 +18,8 @@ from tui.drive.profile import library
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
 from tui.session.diagnosis.evidence import DiagnosticEvidence
 from tui.session.diagnosis.examining import CLEAN_READS, LEAST_READS, clean_reads, examine_line
-from tui.session.diagnosis.heard import Heard
 from tui.session.diagnosis.measure import Measure, measure_of
+from tui.session.diagnosis.reply_evidence import ReplyEvidence
 from tui.simulator import DriveSpec, Simulation, troubles_of
 from tui.wire.frames import frame
 
@@ -287,7 +287,7 @@ async def test_two_drives_are_not_reported_as_one_behind() -> None:
 @pytest.mark.parametrize(("second", "rung"), [(0, "behind"), (1, "behind"), (5, "two-drives")])
 def test_surplus_replies_contradict_a_line_one_behind(second: int, rung: str) -> None:
     measure = Measure(requested=8, answered=4, damaged=4, second=second)
-    heard = Heard(requested=3, answered=3)
+    heard = ReplyEvidence(requested=3, answered=3)
     sight = DiagnosticEvidence(RtuTcpLink("h", 1), 2, heard=heard, measure=measure, behind=True)
     assert diagnosed(sight).rung == rung
 

@@ -18,7 +18,7 @@ from tui.drive.profile.profile import Profile
 from tui.session.diagnosis import next_steps
 from tui.session.diagnosis.evidence import AdapterSeen, DiagnosticEvidence
 from tui.session.diagnosis.gateway_probe import Works
-from tui.session.diagnosis.heard import Heard
+from tui.session.diagnosis.reply_evidence import ReplyEvidence
 
 PORT = "/dev/ttyUSB7"
 STEPS: dict[str, Callable[[DiagnosticEvidence], Iterable[str]]] = {
@@ -46,7 +46,7 @@ EVIDENCE = DiagnosticEvidence(
     5,
     changed="Another adapter.",
     works=Works("tcp:10.0.0.9", 1),
-    heard=Heard(requested=3, others=(7, 8), exceptions=(2,)),
+    heard=ReplyEvidence(requested=3, others=(7, 8), exceptions=(2,)),
 )
 
 
@@ -110,11 +110,23 @@ def test_no_next_step_is_given_twice(name: str) -> None:
         ("part_drives", EVIDENCE, ["address 5"]),
         ("set_unit", EVIDENCE, ["tcp:10.0.0.9", "address 5"]),
         ("open_what_works", EVIDENCE, ["open tcp:10.0.0.9"]),
-        ("ask_gateway", replace(EVIDENCE, heard=Heard(exceptions=(10,))), ["address 5 routed"]),
-        ("ask_gateway", replace(EVIDENCE, heard=Heard(exceptions=(11,))), ["serial side"]),
-        ("ask_otherwise", replace(EVIDENCE, heard=Heard(exceptions=(4,))), ["has a trouble"]),
-        ("ask_otherwise", replace(EVIDENCE, heard=Heard(exceptions=(6,))), ["Ask again"]),
-        ("ask_otherwise", replace(EVIDENCE, heard=Heard(exceptions=(3,))), ["Name the drive's"]),
+        (
+            "ask_gateway",
+            replace(EVIDENCE, heard=ReplyEvidence(exceptions=(10,))),
+            ["address 5 routed"],
+        ),
+        ("ask_gateway", replace(EVIDENCE, heard=ReplyEvidence(exceptions=(11,))), ["serial side"]),
+        (
+            "ask_otherwise",
+            replace(EVIDENCE, heard=ReplyEvidence(exceptions=(4,))),
+            ["has a trouble"],
+        ),
+        ("ask_otherwise", replace(EVIDENCE, heard=ReplyEvidence(exceptions=(6,))), ["Ask again"]),
+        (
+            "ask_otherwise",
+            replace(EVIDENCE, heard=ReplyEvidence(exceptions=(3,))),
+            ["Name the drive's"],
+        ),
     ],
 )
 def test_next_step_names_what_the_evidence_shows(

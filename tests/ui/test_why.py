@@ -19,7 +19,7 @@ from tui.screens.why import WhyScreen, reason_lines
 from tui.session.connect.open_line import open_line
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
 from tui.session.diagnosis.evidence import DiagnosticEvidence
-from tui.session.diagnosis.heard import Heard
+from tui.session.diagnosis.reply_evidence import ReplyEvidence
 from tui.session.events import EventLog
 
 from . import fakes
@@ -100,7 +100,7 @@ async def test_why_on_monitor_is_about_the_open_drive() -> None:
 
 
 def silence(family: str) -> Diagnosis:
-    heard = Heard(requested=2)
+    heard = ReplyEvidence(requested=2)
     return diagnosed(
         DiagnosticEvidence(SerialLink("/dev/ttyUSB0"), 2, library.load(family), heard=heard)
     )

@@ -14,8 +14,8 @@ from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.wiring.screen import WiringScreen
 from tui.session.diagnosis import examining
 from tui.session.diagnosis.evidence import DiagnosticEvidence
-from tui.session.diagnosis.heard import Heard
 from tui.session.diagnosis.measure import Measure
+from tui.session.diagnosis.reply_evidence import ReplyEvidence
 
 from .test_frame import Panel, panel
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too
@@ -44,7 +44,7 @@ async def test_diagnosis_is_the_first_section_until_the_drive_answers(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     measure = Measure(requested=40, answered=30, lost=10, seconds=2.0)
-    heard = Heard(requested=40, answered=30)
+    heard = ReplyEvidence(requested=40, answered=30)
     seen = [DiagnosticEvidence(RtuTcpLink("h", 1), 1, heard=heard, measure=measure)]
     seen.append(replace(seen[0], measure=Measure(requested=40, answered=40)))
 

@@ -27,7 +27,7 @@ from ..connect.identify import status_words_without_identification
 from ..connect.known_lines import line_name, load_memory
 from ..connect.limits import limits_of
 from .evidence import SAME_ADAPTER, AdapterSeen, DiagnosticEvidence
-from .heard import Heard, heard_by_errors, heard_of
+from .reply_evidence import ReplyEvidence, evidence_of_errors, evidence_of_frames
 
 PROBE_TRIES = 3
 """Number of reads of a drive that answers, up to the first unanswered one."""
@@ -145,7 +145,7 @@ def _questions(line: ModbusLine, device: int, profile: Profile | None) -> list[A
 
 async def _heard(
     line: ModbusLine, device: int, last: float, outcomes: Sequence[LineError | None]
-) -> Heard:
+) -> ReplyEvidence:
     """Return the replies from the frames; from the results of the requests if frames are not
     recorded."""
     tcp = isinstance(line.link, TcpLink)
@@ -154,8 +154,10 @@ async def _heard(
     if _attached(line):
         # replies come later than their requests
         await REAL_CLOCK.sleep(FRAMES_COME_WITHIN)
-    heard = heard_of((frame for frame in line.trace if frame.time > last), device, tcp=tcp)
-    return heard if heard.requested >= len(outcomes) else heard_by_errors(outcomes, device)
+    heard = evidence_of_frames(
+        (frame for frame in line.trace if frame.time > last), device, tcp=tcp
+    )
+    return heard if heard.requested >= len(outcomes) else evidence_of_errors(outcomes, device)
 
 
 def last_time(frames: Sequence[Frame]) -> float:

@@ -12,11 +12,11 @@ from tui.drive.profile.profile import Profile
 
 from ..connect.identify import DriveIdentity
 from .gateway_probe import Works
-from .heard import Heard
 from .measure import Measure
+from .reply_evidence import ReplyEvidence
 
 NO_ERRORS = PortErrors(0, 0, 0, 0)
-NO_REQUEST_SEEN = Heard()
+NO_REQUEST_SEEN = ReplyEvidence()
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ class DiagnosticEvidence:
     adapter: AdapterSeen = SAME_ADAPTER
     changed: str = ""
     """Differences from the stored line for which writes are held."""
-    heard: Heard = NO_REQUEST_SEEN
+    heard: ReplyEvidence = NO_REQUEST_SEEN
     withheld: str = ""
     """Why this program sent nothing to the drive."""
     errors: PortErrors = NO_ERRORS

@@ -16,7 +16,7 @@ from tui.bus.link import ONLY_UNITS, RtuTcpLink, TcpLink, label
 from tui.drive.profile.profile import Profile
 from tui.wire.frames import frame, is_whole
 
-from .heard import REFUSED, TCP_HEAD
+from .reply_evidence import REFUSED, TCP_HEAD
 
 WITHIN = 1.0
 """Seconds each for the connection and for the reply."""

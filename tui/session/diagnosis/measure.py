@@ -9,7 +9,7 @@ from statistics import median
 from tui.bus.trace import Frame
 from tui.wire.frames import is_whole
 
-from .heard import LATE_NOTE, REFUSED, REGISTER_READS, TCP_HEAD, due_bytes
+from .reply_evidence import LATE_NOTE, REFUSED, REGISTER_READS, TCP_HEAD, due_bytes
 
 SICK_KINDS = ("late", "lost", "damaged", "duplicated", "foreign", "unreached")
 DAMAGED_NOTE = "damaged"

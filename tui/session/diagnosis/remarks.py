@@ -8,7 +8,7 @@ from tui.bus.link import TcpLink
 from ..connect.addresses import addresses_text
 from .asking import last_time
 from .gateway_probe import GATEWAY_CODES
-from .heard import ECHO_NOTE, REFUSED, TCP_HEAD
+from .reply_evidence import ECHO_NOTE, REFUSED, TCP_HEAD
 
 
 class LineRemarks:

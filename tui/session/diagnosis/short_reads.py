@@ -22,7 +22,7 @@ from tui.drive.values import raw_range, word_count
 
 from ..clock import REAL_CLOCK
 from ..connect.identify import status_words_without_identification
-from .heard import TCP_HEAD
+from .reply_evidence import TCP_HEAD
 
 FRAMES_AT_ONCE = 50
 """Number of reads after which their frames are collected: a line keeps only the last frames."""

@@ -20,7 +20,7 @@ LATE_NOTE = "late"
 
 
 @dataclass(frozen=True, slots=True)
-class Heard:
+class ReplyEvidence:
     """Counts of the replies to the requests to one drive."""
 
     requested: int = 0
@@ -58,9 +58,9 @@ class Heard:
         )
 
 
-def heard_of(frames: Iterable[Frame], device: int, *, tcp: bool = False) -> Heard:
+def evidence_of_frames(frames: Iterable[Frame], device: int, *, tcp: bool = False) -> ReplyEvidence:
     """Return the frames about a device; those of other requests are skipped."""
-    found, request = Heard(), b""
+    found, request = ReplyEvidence(), b""
     exchange: list[Frame] = []
     for frame in frames:
         if frame.direction == "in":
@@ -77,7 +77,9 @@ def _device(data: bytes, tcp: bool) -> int:
     return data[at] if len(data) > at else -1
 
 
-def _with(found: Heard, request: bytes, answers: Iterable[Frame], tcp: bool) -> Heard:
+def _with(
+    found: ReplyEvidence, request: bytes, answers: Iterable[Frame], tcp: bool
+) -> ReplyEvidence:
     """Return the counts with one more exchange."""
     if not request:
         return found
@@ -97,7 +99,9 @@ def _with(found: Heard, request: bytes, answers: Iterable[Frame], tcp: bool) -> 
     return _with_loose(found, requested, loose, alone=alone)
 
 
-def _with_whole(found: Heard, requested: bytes, body: bytes, *, late: bool) -> Heard:
+def _with_whole(
+    found: ReplyEvidence, requested: bytes, body: bytes, *, late: bool
+) -> ReplyEvidence:
     """Return the counts with one more intact frame: address, function and data."""
     device, function = body[0], body[1]
     if device != requested[0]:
@@ -113,7 +117,9 @@ def _with_whole(found: Heard, requested: bytes, body: bytes, *, late: bool) -> H
     return replace(found, answered=found.answered + 1)
 
 
-def _with_loose(found: Heard, requested: bytes, loose: bytes, *, alone: bool) -> Heard:
+def _with_loose(
+    found: ReplyEvidence, requested: bytes, loose: bytes, *, alone: bool
+) -> ReplyEvidence:
     if not loose:
         return found
     if loose[:2] in (requested[:2], bytes([requested[0], requested[1] | REFUSED])):
@@ -135,10 +141,10 @@ def _once(known: tuple[int, ...], new: int) -> tuple[int, ...]:
     return known if new in known else (*known, new)
 
 
-def heard_by_errors(outcomes: Iterable[LineError | None], device: int) -> Heard:
+def evidence_of_errors(outcomes: Iterable[LineError | None], device: int) -> ReplyEvidence:
     """Return the same counts from the results of requests, None for an answer, if frames are
     missing."""
-    found = Heard()
+    found = ReplyEvidence()
     for outcome in outcomes:
         found = replace(found, requested=found.requested + 1)
         match outcome:
