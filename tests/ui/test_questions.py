@@ -349,6 +349,24 @@ def test_motor_state_is_shown_in_one_line() -> None:
     assert now_text(None) == "? state unknown"
 
 
+def age_in_status_bar(snapshot: Snapshot | None, look: Look | None = None) -> float | None:
+    console = fakes.console_of(snapshot)
+    watch = fakes.FakeLineWatch(looks={console.device: look} if look else {})
+    fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, console), line_watch=watch)
+    return drive_now(console, fleet, fakes.NOW).age
+
+
+def test_age_of_a_state_is_that_of_its_values_not_of_the_last_failed_read() -> None:
+    old = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING, age=14.0, error="No answer.")
+    just_failed = replace(old, time=fakes.NOW)
+    assert now_text(just_failed) == "? state unknown   14s ago: FORWARD"
+    assert age_in_status_bar(just_failed) == 14.0
+    before = fakes.look_of(fakes.RUNNING, age=14.0)
+    failed = Look(None, "No answer.", fakes.NOW, None, {}, before)
+    assert now_text(None, failed) == "? state unknown   14s ago: FORWARD"
+    assert age_in_status_bar(None, failed) == 14.0
+
+
 @pytest.mark.parametrize(
     ("raws", "word"),
     [

@@ -275,12 +275,13 @@ def _seen(
     """Last state, its age in seconds if it is not current, and last readings."""
     snapshot = console.latest
     if look is not None:
-        age = max(0.0, now - look.time)
+        read = look.before if look.error and look.before else look
+        age = max(0.0, now - read.time)
         old = age > LOOK_IS_OLD or bool(look.error)
-        return look.state, age if old else None, look.readings
+        return read.state, age if old else None, read.readings
     if snapshot is None:
         return None, None, {}
-    age = max(0.0, now - snapshot.time)
+    age = max(0.0, now - snapshot.read_at)
     lost = bool(snapshot.error) or snapshot.is_stale(now)
     return snapshot.state, age if lost else None, snapshot.readings
 

@@ -44,7 +44,7 @@ def motor_state_text(
     """
     if snapshot is None or (look is not None and look.time > snapshot.time):
         return _by_look(look, now, words)
-    age = max(0.0, now - snapshot.time)
+    age = max(0.0, now - snapshot.read_at)
     cycle = max(period, 1 / snapshot.rate if snapshot.rate else period)
     heard = not snapshot.error and snapshot.line.status is LineStatus.CONNECTED
     if not heard or age > stale_after(cycle) or snapshot.state.kind == "unknown":
@@ -70,12 +70,13 @@ def motor_state_text(
 
 def _by_look(look: Look | None, now: float, words: StateWords) -> Text:
     """Return the state from the line watch, which reads no values."""
-    if look is None or look.state is None:
+    read = look.before if look is not None and look.error else look
+    if look is None or read is None or read.state is None:
         return _not_known("", None)
-    age = max(0.0, now - look.time)
-    if look.error or age > stale_after(GLANCE) or look.state.kind == "unknown":
-        return _not_known(words(look.state, look.readings)[1], age)
-    return _state(*words(look.state, look.readings))
+    age = max(0.0, now - read.time)
+    if look.error or age > stale_after(GLANCE) or read.state.kind == "unknown":
+        return _not_known(words(read.state, read.readings)[1], age)
+    return _state(*words(read.state, read.readings))
 
 
 def _state(kind: str, headline: str) -> Text:

@@ -133,8 +133,7 @@ class View:
         """Seconds since the newest value was read; None while values are current or missing."""
         if self.snapshot is None or not self.lost:
             return None
-        times = [reading.time for reading in self.snapshot.readings.values()]
-        return max(0.0, self.now - max(times, default=self.snapshot.time))
+        return max(0.0, self.now - self.snapshot.read_at)
 
     @property
     def trouble(self) -> str:

@@ -56,6 +56,15 @@ class Snapshot:
         """True if the line does not keep the target cycle time."""
         return self.period > TOO_SLOW * self.wished
 
+    @property
+    def read_at(self) -> float:
+        """When its newest value was read (monotonic); the end of the cycle if it has none.
+
+        A failed cycle has later times than its values.
+        """
+        times = (reading.time for reading in self.readings.values() if reading.raw is not None)
+        return max(times, default=self.time)
+
     def is_stale(self, now: float) -> bool:
         """Return True if the last cycle ended so long ago that none of its values is current."""
         return now - self.time > max(stale_after(self.period), STALE_LEAST)
