@@ -388,6 +388,19 @@ def test_stop_in_one_panel_stops_the_motor_of_the_other(
 
 
 @pytest.mark.usefixtures("holder")
+def test_stop_of_all_drives_reaches_the_drive_of_another_panel(
+    terminal_with: Start, second_terminal: Start
+) -> None:
+    with panel_running(terminal_with) as made:
+        other = second_terminal([sys.executable, "-m", "tui", made.line, "-d", "2"])
+        other.wait_for("No drive answered")
+        other.press("F9")
+        made.stopped()
+        made.terminal.wait_for("STANDBY", "The motor is stopped")
+        other.wait_for("Drive 1: The motor is stopped")
+
+
+@pytest.mark.usefixtures("holder")
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGKILL])
 def test_exiting_panel_stops_its_motor_and_the_other_panel_continues(
     terminal_with: Start, second_terminal: Start, number: signal.Signals

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
+from functools import partial
 from typing import TYPE_CHECKING
 
 from textual.events import Event, InputEvent, Key, Paste
@@ -161,20 +162,33 @@ class KeyDispatcher(HarmlessKeys):
                     self._stop_sessions(fleet, [chosen.session])
             except Exception as error:
                 fleet.last_stop(error, chosen)
+        others: dict[Fleet, Collection[int]] = {}
+        if chosen is None:
+            # after this program's own, which depend on no other process
+            for fleet in every_fleet(self):
+                carried_on(partial(_stop_others, fleet, others))
         if self.hearing:
             carried_on(lambda: soon_in_loop(self, self._warn, NO_STOP_HERE))
         elif chosen is None:
-            carried_on(lambda: soon_in_loop(self, self._tell_unreached))
+            carried_on(lambda: soon_in_loop(self, self._tell_unreached, others))
 
     def _warn(self, text: str) -> None:
         """Report on every screen that a stop has stopped nothing."""
         self.notify(text, severity="warning")
 
-    def _tell_unreached(self) -> None:
-        """Report drives that a stop of all did not reach, or that there is no drive."""
-        strangers = [device for fleet in self.fleets for device in fleet.strangers]
+    def _tell_unreached(self, others: Mapping[Fleet, Collection[int]]) -> None:
+        """Report drives that a stop of all did not reach, or that there is no drive.
+
+        `others` are drives of other programs, which the holder of the line stops.
+        """
+        strangers = [
+            device
+            for fleet in self.fleets
+            for device in fleet.strangers
+            if device not in others.get(fleet, ())
+        ]
         if not strangers:
-            if not any(fleet.sessions for fleet in self.fleets):
+            if not any(others.values()) and not any(fleet.sessions for fleet in self.fleets):
                 self._warn(NOBODY_TO_STOP)
         else:
             text = UNREACHED.format(", ".join(map(str, strangers)))
@@ -271,6 +285,10 @@ class KeyDispatcher(HarmlessKeys):
         if self.hearing and not self.fleets:
             return STOPS_NONE
         return f"STOP {chosen.device}" if chosen is not None else STOPS_ALL
+
+
+def _stop_others(fleet: Fleet, stopped: dict[Fleet, Collection[int]]) -> None:
+    stopped[fleet] = fleet.stop_others()
 
 
 def every_fleet(panel: Panel) -> list[Fleet]:

@@ -36,6 +36,7 @@ from .monitor.line_watch import LineWatch
 from .monitor.snapshot import Snapshot
 from .monitor.unknown_drive_poller import UnknownDrivePoller
 from .sharing.handover import Handover
+from .sharing.stop_others import request_stops_of_others
 from .starts.keeper import StartKeeper
 from .work import Outcome, OutcomeKind
 
@@ -263,6 +264,14 @@ class Fleet:
     ) -> None:
         """Stop drives; for any thread. Raises LineClosed."""
         self.stopper.stop(sessions, order, by)
+
+    def stop_others(self, by: str = "the stop key") -> tuple[int, ...]:
+        """Stop the drives that other programs on the line command, except those in this fleet.
+
+        Return their addresses. For any thread; returns at once.
+        """
+        own = {session.device for session in self.sessions}
+        return request_stops_of_others(self.line, own, by, self.events.add)
 
     def last_stop(self, error: Exception, only: DriveConsole | None = None) -> None:
         """Stop every drive, or only one, by its prepared frames after an internal error.
