@@ -7,6 +7,8 @@ import logging
 import os
 import threading
 
+import pytest
+
 from tests.programs import PATIENCE, wait_until
 from tests.sources import PACKAGE, calls_of
 from tui.session.connect.open_line import open_line
@@ -17,6 +19,7 @@ async def unforeseen() -> None:
     raise ZeroDivisionError("nobody thought of this")
 
 
+@pytest.mark.internal_errors
 def test_failed_task_leaves_its_traceback_in_the_log() -> None:
     start_logging(0)
     opened = open_line("sim:atv71")

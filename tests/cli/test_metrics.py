@@ -209,6 +209,7 @@ async def test_server_answers_metrics_requests_only(served: int) -> None:
     assert (await requested(served, b"\x16\x03\r\n\r\n")).startswith(b"HTTP/1.1 405")
 
 
+@pytest.mark.internal_errors
 async def test_unforeseen_error_does_not_end_the_service() -> None:
     wrong = ["once"]
 

@@ -222,6 +222,7 @@ async def test_everything_is_retained_again_after_a_lost_connection(
     assert "Errno" not in output
 
 
+@pytest.mark.internal_errors
 async def test_unforeseen_error_does_not_end_publishing(
     clients: type[FakeClient],
 ) -> None:

@@ -111,6 +111,7 @@ def test_refusal_by_drivepanel_exits_with_5(refusal: type[Exception]) -> None:
     assert result.stderr == "drivepanel: ACC: 9999 is above 999.9 s.\n"
 
 
+@pytest.mark.internal_errors
 def test_unforeseen_error_is_logged() -> None:
     @click.command()
     @reported

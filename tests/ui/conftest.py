@@ -11,9 +11,12 @@ from textual.css.stylesheet import Stylesheet
 from textual.pilot import Pilot
 from textual.widgets import Input
 
+from tests.internal_errors import no_internal_errors
 from tui.screens.dialogs.question import Question
 
 from .quick import drawn_for_a_person, parse_once, wait_for_the_busy
+
+__all__ = ["no_internal_errors"]
 
 
 @pytest.fixture(autouse=True)

@@ -556,6 +556,7 @@ async def test_return_to_line_asks_nothing_and_keeps_the_drive_alive() -> None:
         await made.stopped()
 
 
+@pytest.mark.internal_errors
 async def test_internal_error_stops_the_motor() -> None:
     ran = []
 

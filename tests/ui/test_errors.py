@@ -48,6 +48,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
+@pytest.mark.internal_errors
 async def test_unforeseen_error_is_one_line_and_the_panel_continues() -> None:
     def broken(*_: Any, **__: Any) -> OpenLine:
         raise RuntimeError("the register of lines is upside down")
@@ -134,6 +135,7 @@ async def test_line_that_opens_after_the_panel_exited_is_closed() -> None:
         await asyncio.sleep(0.05)
 
 
+@pytest.mark.internal_errors
 async def test_internal_error_prints_one_line_without_a_traceback(
     capsys: pytest.CaptureFixture[str],
 ) -> None:

@@ -437,6 +437,7 @@ async def test_key_waits_while_the_one_before_has_its_effect_or_a_line_opens() -
         assert not app.acts_at_once("3", "3", begins=True, after=done)
 
 
+@pytest.mark.internal_errors
 async def test_key_waits_if_its_effect_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
     async with bench("atv71") as made:
         monkeypatch.setattr(made.app, "only_shows", None)

@@ -87,6 +87,7 @@ async def in_a_worker(made: Bench, fail: Fail) -> None:
 
 
 @pytest.mark.parametrize("where", [in_drawing, in_a_key, in_a_worker])
+@pytest.mark.internal_errors
 def test_internal_error_stops_the_motor_before_the_line_closes(
     where: Callable[[Bench, Fail], Awaitable[None]],
     monkeypatch: pytest.MonkeyPatch,

@@ -258,6 +258,7 @@ def waiting(app: DrivePanelApp) -> bool:
     )
 
 
+@pytest.mark.internal_errors
 async def test_error_after_a_stop_key_does_not_prevent_its_frame(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
