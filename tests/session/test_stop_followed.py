@@ -273,6 +273,25 @@ def test_setting_that_cannot_change_while_the_motor_runs_is_certain(
     assert here.stop._sure(["CHCF", "FR1"]) == ({"CHCF": 1} if certain else {})
 
 
+@pytest.mark.internal_errors
+async def test_error_of_the_journal_fails_a_write_and_no_stop(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError("the disk is full")
+
+    monkeypatch.setattr(journal, "add", full)
+    assert await here.stop.carry_out() is None
+    assert (here.written, here.stop.taken) == ([7], True)
+    assert "a stop of device 1 is not in the journal" in caplog.text
+    permit = SimpleNamespace(check=lambda: None, refusal=lambda: "")
+    writer = Writer(here.session, journal, cast(Any, permit))
+    with pytest.raises(OSError, match="disk is full"):
+        await writer.write_parameter(PROFILE["LFr"], 100, why="a test")
+
+
 # -- several stops ---------------------------------------------------------------------------------
 
 
