@@ -319,7 +319,7 @@ def main() -> int:
     options.add_argument("--random", type=int, metavar="N", help="plant N random defects")
     options.add_argument("--seed", type=int, default=1, help="which ones (default: 1)")
     options.add_argument(
-        "--package", metavar="NAME", action="append", help="only in this package of tui; repeatable"
+        "--package", metavar="NAME", action="append", help="only in this folder of tui; repeatable"
     )
     options.add_argument("--stop-path", action="store_true", help="only where a stop passes")
     options.add_argument("--again", action="store_true", help="those not noticed the last time")

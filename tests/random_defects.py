@@ -200,11 +200,11 @@ class Chooser:
         for span in mutant.lines:
             if found := set().union(*(lines.get(line, set()) for line in span)):
                 return found
-        if mutant.lines:
-            return set()
-        used = self._uses.lines(mutant.path, mutant.names)
+        # a function that no test reaches may run at import, as one that makes a table
+        names = [mutant.function.rpartition(".")[2]] if mutant.lines else mutant.names
+        used = self._uses.lines(mutant.path, names)
         found = set().union(*(self._record.lines(path).get(line, set()) for path, line in used))
-        return found or set().union(*lines.values())
+        return found if found or mutant.lines else set().union(*lines.values())
 
     def _best(self, found: set[str], path: str) -> list[list[str]]:
         """First those of files that name the module, then of its package, and others.

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import ast
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
@@ -11,8 +13,18 @@ from tests.defects.defect import Defect
 from tests.defects.equivalent import EQUIVALENT
 from tests.mutants import DEFECTS, ROOT, STALE, SURVIVED, Stale, judge, place_of, planted
 from tests.mutator import KINDS, Defaults, Mutant, Mutator
-from tests.random_defects import EQUAL, UNREACHED, Judged, Uses, all_sites, rate, report, sample
-from tests.reached import new_names, same_lines
+from tests.random_defects import (
+    EQUAL,
+    UNREACHED,
+    Chooser,
+    Judged,
+    Uses,
+    all_sites,
+    rate,
+    report,
+    sample,
+)
+from tests.reached import Record, new_names, same_lines
 from tests.sources import PACKAGE, modules
 
 WHOLE = "def half(x):\n    return x / 2\n"
@@ -213,6 +225,21 @@ def test_constant_is_tested_by_functions_that_use_it() -> None:
     lines = (ROOT / path).read_text("utf-8").splitlines()
     used = next(n for n, line in enumerate(lines, 1) if "max(LONGEST_SILENCE" in line)
     assert Uses().lines(path, ["LONGEST_SILENCE"]) == {(path, used)}
+
+
+def test_function_that_runs_at_import_is_tested_by_users_of_its_result() -> None:
+    path = "tui/wire/frames.py"
+    lines = (ROOT / path).read_text("utf-8").splitlines()
+    used = next(n for n, line in enumerate(lines, 1) if "= _CRC, " in line)
+    (site, *_) = (
+        found
+        for found in Mutator(path, "\n".join(lines), Defaults([])).sites()
+        if found.mutants[0].function == "_table"
+    )
+    reached = {path: {used: {"tests/wire/test_frames.py::test_a"}}}
+    record = SimpleNamespace(tests={}, lines=lambda of: reached.get(of, {}))
+    chooser = Chooser(cast(Record, record))
+    assert chooser._reaching(site.mutants[0]) == {"tests/wire/test_frames.py::test_a"}
 
 
 def test_report_counts_defects_that_no_test_reaches_as_missed() -> None:

@@ -10,5 +10,14 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/schedule/connection.py:Connection._serve: return: return -> pass": (
         "The call before it never returns: it serves until the line is lost, which it raises."
     ),
+    "tui/session/drive.py:DriveSession.request_full_read: constant: 1 -> 2": (
+        "Monitors notice that the count differs, not by how much."
+    ),
+    "tui/session/drive.py:DriveSession.request_full_read: constant: 1 -> 10": (
+        "Monitors notice that the count differs, not by how much."
+    ),
+    "tui/session/command/stop.py:Stopper.stop: constant: 0.0 -> 1.0": (
+        "It is the time of a stop of no drives, which has no report."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""
