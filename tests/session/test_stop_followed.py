@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
 from tui.bus.api import LineStatus, Priority
-from tui.bus.errors import LineLost, NoAnswer
+from tui.bus.errors import LineFailed, LineLost, NoAnswer
 from tui.bus.requests import Read, WriteOne
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 from tui.session.clock import Clock
 from tui.session.command import stop as stops
+from tui.session.command.last_stop import LastStop, end_work
 from tui.session.command.motor_stop import FirstWave, MotorStop
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import OVER, Phase, StopReport
@@ -374,3 +375,161 @@ async def test_stop_of_a_lost_line_is_left_to_the_prepared_frames(journal: Journ
     stopper.stop([DriveSession(drive, 1, PROFILE, clock=drive.clock)])
     await turns()
     assert sent == [(1, 1000.0, LineLost, False)]
+
+
+# -- prepared frames, after an internal error ------------------------------------------------------
+
+
+class Prepared:
+    """A last stop of a drive; `ended` is called as the line does once its frames are sent."""
+
+    def __init__(self, journal: Journal, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.drive = Ramp(OwnTime(), 0.0)
+        self.session = DriveSession(self.drive, 1, PROFILE, clock=self.drive.clock)
+        self.reports: list[tuple[int, Phase, str, float]] = []
+        self.entries: list[Any] = []
+        self.sent: list[object] = []
+        self.why = ""
+        self.fails: Exception | None = None
+        monkeypatch.setattr(journal, "add", lambda entry, **_: self.entries.append(entry))
+        monkeypatch.setattr(self.drive, "send_prepared", self._send)
+        self.last = LastStop(self.drive, journal, self._say)
+
+    def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
+        self.reports.append((session.device, phase, text, ordered))
+
+    def _send(self, writes: Any, ended: Callable[[str], None]) -> None:
+        self.sent.append(writes)
+        if self.fails is not None:
+            raise self.fails
+        ended(self.why)
+
+    def send(self, error: Exception, *, taken: bool = False) -> tuple[int, Phase, str, float]:
+        self.last.send(self.session, 990.0, error, taken=taken)
+        return self.reports[-1]
+
+
+LOST, BROKEN = LineLost("The line is lost."), ZeroDivisionError("on purpose")
+AT = "Stop it at the machine."
+
+
+@pytest.mark.internal_errors
+async def test_prepared_frames_are_recorded_and_the_motor_is_followed(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    here = Prepared(journal, monkeypatch)
+    here.session.image.confirm("CMD", 15, 1000.0)
+    here.drive.stopped_at = 1000.0
+    assert here.session.prepared
+    text = "stop sent by its prepared frames after an internal error; see the log"
+    assert here.send(BROKEN) == (1, Phase.STOPPING, text, 990.0)
+    assert here.sent == [here.session.prepared]
+    assert here.session.reported_by_line
+    assert "CMD" not in here.session.image.trusted, "it holds another word now"
+    written = [
+        write.request for write in here.session.prepared if isinstance(write.request, WriteOne)
+    ]
+    assert [(entry.address, entry.new_raw, entry.new, entry.why) for entry in here.entries] == [
+        (request.address, request.value, f"16#{request.value:04X}", text) for request in written
+    ]
+    assert {entry.code for entry in here.entries} == {"CMD"}
+    assert "stop of device 1" in caplog.text
+    async with asyncio.timeout(20.0):
+        while here.reports[-1][1] is not Phase.STOPPED:  # noqa: ASYNC110 - as its clock goes
+            await asyncio.sleep(0)
+    assert here.reports[-1] == (1, Phase.STOPPED, "stopped", 990.0)
+
+
+@pytest.mark.internal_errors
+@pytest.mark.parametrize(
+    ("error", "why", "fails", "text"),
+    [
+        (BROKEN, "the port is closed", None, "NOT STOPPED: an internal error (see the log), and its"
+         f" prepared frame was not sent: the port is closed. {AT}"),
+        (BROKEN, "", OSError("no port"), "NOT STOPPED: an internal error (see the log), and its"
+         f" prepared frame was not sent: no port. {AT}"),
+        (BROKEN, "", OSError(), "NOT STOPPED: an internal error (see the log), and its"
+         f" prepared frame was not sent: OSError. {AT}"),
+        (LOST, "the port is closed", None, f"NOT STOPPED: The line is lost. {AT}"),
+    ],
+)  # fmt: skip
+async def test_prepared_frames_that_are_not_sent_leave_the_motor_to_a_person(
+    error: Exception, why: str, fails: Exception | None, text: str,
+    journal: Journal, monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    here = Prepared(journal, monkeypatch)
+    here.why, here.fails = why, fails
+    assert here.send(error) == (1, Phase.FAILED, text, 990.0)
+    assert here.entries == []
+
+
+@pytest.mark.internal_errors
+async def test_no_other_word_follows_one_that_the_drive_has_acknowledged(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    here = Prepared(journal, monkeypatch)
+    internal = "NOT STOPPED: an internal error (see the log)"
+    sent = f"{internal}. Its stop was sent, but not seen to work. {AT}"
+    assert here.send(BROKEN, taken=True) == (1, Phase.FAILED, sent, 990.0)
+    assert here.send(LineFailed("It failed."), taken=True)[2] == sent
+    caplog.clear()
+    assert here.send(LOST, taken=True)[2] == f"NOT STOPPED: The line is lost. {AT}"
+    assert caplog.text == "", "a lost line is no internal error"
+    here.session.prepared = ()
+    assert here.send(LOST)[2] == f"NOT STOPPED: The line is lost. {AT}"
+    none = f"{internal}, and no frame was ready. {AT}"
+    assert here.send(BROKEN) == (1, Phase.FAILED, none, 990.0)
+    assert here.sent == []
+
+
+async def test_stop_on_a_lost_line_is_sent_on_a_connection_of_its_own(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Prepared(journal, monkeypatch)
+    here.drive.spawn = lambda *_: None  # type: ignore[method-assign,assignment]
+    text = "stop sent on a connection of its own, as the line was lost"
+    assert here.send(LOST) == (1, Phase.STOPPING, text, 990.0)
+
+
+@pytest.mark.internal_errors
+async def test_motor_that_cannot_be_followed_counts_as_not_stopped(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Prepared(journal, monkeypatch)
+
+    def closed(*_: object) -> None:
+        raise RuntimeError("closed")
+
+    here.drive.spawn = closed  # type: ignore[method-assign,assignment]
+    assert "not seen to work" in here.send(BROKEN)[2]
+    for error, text in (
+        (NoAnswer(1, 3, 100), "NOT STOPPED: "), (BROKEN, "not seen to work")
+    ):  # fmt: skip
+
+        async def follow(_: MotorStop, error: Exception = error) -> None:
+            raise error
+
+        monkeypatch.setattr(MotorStop, "follow", follow)
+        await here.last._follow(here.session, 990.0)
+        assert here.reports[-1][1] is Phase.FAILED
+        assert text in here.reports[-1][2]
+
+
+@pytest.mark.internal_errors
+@pytest.mark.parametrize("fails", [True, False])
+def test_stop_count_of_a_drive_rises_once_whatever_fails(
+    fails: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive = Ramp(OwnTime(), 0.0)
+    session = DriveSession(drive, 1, PROFILE, clock=drive.clock)
+    withdrawn: list[object] = []
+    session.starts = cast(Any, SimpleNamespace(withdraw=withdrawn.append))
+    if fails:
+        monkeypatch.setattr(session.work, "stop", lambda by: 1 / 0)
+    before = session.work.stops
+    end_work(session, "a test")
+    assert session.work.stops == before + 1
+    assert withdrawn == [session]
+    session.starts = None
+    end_work(session, "a test")
+    assert session.work.stops == before + 2
