@@ -7,6 +7,8 @@ import logging
 import random
 import threading
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -14,6 +16,7 @@ from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineClosed, LineError
 from tui.bus.line import Line
 from tui.bus.link import SerialLink
+from tui.bus.schedule.engine import Engine
 from tui.bus.transport.ports import is_pseudo_terminal, list_ports
 
 from .conftest import WIDE, OpenLine
@@ -196,3 +199,36 @@ def test_ports_are_listed_in_order(tmp_path: Path) -> None:
     assert not is_pseudo_terminal(str(tmp_path))
     assert not is_pseudo_terminal(str(tmp_path / "none"))
     assert [port.path for port in list_ports()] == sorted(port.path for port in list_ports())
+
+
+@pytest.mark.parametrize(("accepting", "loop"), [(False, True), (True, False), (False, False)])
+def test_line_that_is_closed_takes_no_work(accepting: bool, loop: bool) -> None:
+    """Work that a loop which ends never begins would be waited for without an end."""
+    engine = cast(Any, object.__new__(Engine))
+    begun: list[object] = []
+    engine._lock, engine._accepting = threading.Lock(), accepting
+    engine._loop = SimpleNamespace(call_soon_threadsafe=lambda *work: begun.append(work))
+    engine._loop = engine._loop if loop else None
+    with pytest.raises(LineClosed):
+        engine._enter(begun.append, "a request")
+    assert begun == []
+
+
+def test_line_whose_loop_has_ended_takes_no_work() -> None:
+    engine = cast(Any, object.__new__(Engine))
+
+    def ended(*_: object) -> None:
+        raise RuntimeError("Event loop is closed")
+
+    engine._lock, engine._accepting = threading.Lock(), True
+    engine._last_way = engine._dispatcher = SimpleNamespace(put=print, wake=print)
+    engine._loop = SimpleNamespace(call_soon_threadsafe=ended)
+    engine._wake()
+    with pytest.raises(LineClosed):
+        engine._enter(print, "a request")
+    with pytest.raises(LineClosed):
+        engine.send_prepared([], print)
+    engine._loop = None
+    with pytest.raises(LineClosed):
+        engine.send_prepared([], print)
+    engine._wake()

@@ -19,5 +19,8 @@ EQUIVALENT: dict[str, str] = {
     "tui/session/command/stop.py:Stopper.stop: constant: 0.0 -> 1.0": (
         "It is the time of a stop of no drives, which has no report."
     ),
+    "tui/bus/schedule/queue.py:LineShares.come: return: return -> pass": (
+        "Kinds without a minimum share are counted no time, so that each program has had none."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""
