@@ -20,6 +20,7 @@ from tui.session.arming import Arming, CommandedElsewhere, NotArmed
 from tui.session.work import (
     BY_STOP,
     MOST_WAITING,
+    STOPPED_DISARMS,
     Outcome,
     OutcomeKind,
     Permit,
@@ -429,6 +430,18 @@ async def test_stop_while_a_drive_is_armed_leaves_it_disarmed(
     notified.queue.arm(notified.queue.stops, 60.0)
     stop.join(20.0)
     assert not notified.arming.armed
+
+
+async def test_second_report_of_a_stop_keeps_why_the_drive_was_disarmed() -> None:
+    work = Notified()
+    work.queue.stop("the stop key")
+    work.queue.stop("a panel")
+    assert (work.queue.stops, work.queue.stopped_by) == (2, "a panel")
+    assert work.arming.why_disarmed == STOPPED_DISARMS
+    never = Notified()
+    never.arming.disarm("Disarmed.")
+    never.queue.stop("a panel")
+    assert never.arming.why_disarmed == "", "no stop has disarmed it"
 
 
 # -- arming, in time that the test sets ------------------------------------------------------------
