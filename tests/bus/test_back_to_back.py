@@ -9,7 +9,7 @@ import pytest
 
 from tui.bus.limits import CAUTIOUS
 from tui.bus.model import Priority
-from tui.bus.requests import Read
+from tui.bus.requests import Read, WriteOne
 from tui.bus.schedule.back_to_back import LONGEST_PAUSE, POLLS_SHARE, BackToBack
 from tui.bus.schedule.queue import Job, JobQueue
 
@@ -145,3 +145,102 @@ def test_no_request_is_sent_between_a_stop_and_the_read_before_it() -> None:
     bench.come("serve", Priority.STOP)
     assert bench.work() is None
     assert [program for program, _ in bench.sent] == ["serve", "serve"]
+
+
+# -- each limit ------------------------------------------------------------------------------------
+
+
+def due(line: BackToBack, priority: Priority = Priority.POLL) -> float:
+    return line.not_before(Job(Read(1, 1, 1), priority, CAUTIOUS))
+
+
+def read(line: BackToBack, pause: float, program: str = "serve", takes: float = 0.0) -> float:
+    """A read of a program so long after the last one; returns when it is over."""
+    requested = line._ended + pause
+    job = Job(Read(1, 1, 1), Priority.OPERATOR_READ, CAUTIOUS, program=program, requested=requested)
+    line.count(job, requested, requested + takes)
+    return requested + takes
+
+
+def polled(line: BackToBack, begun: float, seconds: float) -> None:
+    line.count(Job(Read(1, 1, 1), Priority.POLL, CAUTIOUS), begun, begun + seconds)
+
+
+def test_line_is_kept_free_for_the_longest_pause_of_a_program() -> None:
+    line = BackToBack()
+    polled(line, 99.0, 1.0)
+    line._ended = 100.0
+    read(line, 0.01)
+    assert due(line) == line._ended, "one read is no series"
+    ended = read(line, 0.02)
+    assert due(line) == pytest.approx(ended + 1.25 * 0.02 + 0.003)
+    ended = read(line, 0.004)
+    assert due(line) == pytest.approx(ended + 1.25 * 0.02 + 0.003), "the longest of the last ones"
+    for priority in (Priority.STOP, Priority.FEED, Priority.OPERATOR_WRITE, Priority.OPERATOR_READ):
+        assert due(line, priority) == 0.0, priority
+    assert due(line, Priority.BACKGROUND) == due(line)
+    ended = read(line, 0.021)
+    assert line._free_until == ended, "it paused"
+    ended = read(line, 0.01)
+    assert line._free_until == pytest.approx(ended + 1.25 * 0.01 + 0.003)
+    ended = read(line, 0.01, "another")
+    assert line._free_until == ended
+
+
+def test_only_the_last_four_pauses_count_and_an_early_request_has_none() -> None:
+    line = BackToBack()
+    polled(line, 99.0, 1.0)
+    line._ended = 100.0
+    for pause in (0.02, 0.02, 0.004, 0.004, 0.004):
+        ended = read(line, pause)
+    assert due(line) == pytest.approx(ended + 1.25 * 0.02 + 0.003)
+    ended = read(line, 0.004)
+    assert due(line) == pytest.approx(ended + 1.25 * 0.004 + 0.003)
+    for _ in range(4):
+        ended = read(line, -0.01)
+    assert due(line) == pytest.approx(ended + 0.003)
+
+
+@pytest.mark.parametrize(("takes", "owed"), [(0.05, False), (0.06, True)])
+def test_poll_goes_first_once_reads_have_had_their_share(takes: float, owed: bool) -> None:
+    line = BackToBack()
+    line._ended = 100.0
+    polled(line, 99.0, 0.02)
+    for _ in range(2):
+        ended = read(line, 0.01, takes=takes)
+    assert line._read == pytest.approx(2 * takes)
+    assert (due(line) == 0.0) == owed  # 0.15 of 0.113 s reads and 0.02 s poll
+    if not owed:
+        assert due(line) > ended
+    polled(line, ended, 0.02)
+    assert line._read == 0.0
+
+
+def test_stop_word_finds_the_line_free_after_what_is_read_for_it() -> None:
+    line = BackToBack()
+    line.count(Job(Read(1, 1, 1), Priority.STOP, CAUTIOUS), 99.0, 100.0)
+    assert due(line, Priority.OPERATOR_READ) == 100.0 + LONGEST_PAUSE
+    assert due(line, Priority.FEED) == 0.0
+    line.count(Job(WriteOne(1, 1, 1), Priority.STOP, CAUTIOUS), 100.0, 100.1)
+    assert due(line, Priority.OPERATOR_READ) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("pauses", "poll", "gap"),
+    [
+        ([0.5] * 4, 0.05, 0.0425), ([0.5] * 4, 0.5, 0.1), ([0.5] * 3, 0.05, 0.0),
+        ([0.02] * 4, 0.05, 0.0), ([0.5] * 4 + [2.1], 0.05, 0.0), ([0.5] * 3 + [2.0], 0.05, 0.0425),
+    ],
+)  # fmt: skip
+def test_gap_between_polls_is_left_to_a_program_that_asks_again_and_again(
+    pauses: list[float], poll: float, gap: float
+) -> None:
+    line = BackToBack()
+    line._ended = 100.0
+    for pause in pauses:
+        ended = read(line, pause)
+    polled(line, ended, poll)
+    assert line._gap_until == pytest.approx(ended + poll + gap)
+    longest = max(pauses)
+    polled(line, ended + 2 * longest, 0.001)
+    assert line._gap_until == pytest.approx(ended + 2 * longest + 0.001), "it has left"
