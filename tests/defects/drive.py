@@ -402,8 +402,8 @@ DEFECTS = (
     Defect(
         "help-names-what-is-not-there",
         "tui/drive/profile/help_file.py",
-        "if look.code not in codes:",
-        "if look.code not in codes and False:",
+        "if look.code not in parameters:",
+        "if look.code not in parameters and False:",
         "A fault points at a parameter that the drive does not have.",
         ("tests/drive/test_fault_help.py",),
     ),
