@@ -22,5 +22,8 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/schedule/queue.py:LineShares.come: return: return -> pass": (
         "Kinds without a minimum share are counted no time, so that each program has had none."
     ),
+    "tui/drive/read_plan.py:run_length: constant: 0 -> 1": (
+        "A run of one parameter has returned by then, and all of a run have the same function."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""
