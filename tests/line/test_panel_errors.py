@@ -42,7 +42,7 @@ DIALOGS = {
     "HelpScreen": "keys.help",
     "OptionsScreen": "command.command_keys",
     "PickWord": "command.teaching",
-    "PickParameter": "blocks.pick_parameter",
+    "PickParameter": "dialogs.pick_parameter",
     "EditNumber": "parameters.edit_value",
     "PickValue": "parameters.edit_value",
     "EditBits": "parameters.edit_value",

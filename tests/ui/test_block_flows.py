@@ -11,13 +11,13 @@ from textual.widgets import Input
 from tests.sweeps import kept
 from tui.drive.blocks.wire_cost import Cost, Saving
 from tui.drive.settings.writable import AT_REST
-from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.blocks.view import cost_lines
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.pick_parameter import PickParameter
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.monitor.screen import MonitorScreen

@@ -472,7 +472,7 @@ def test_number_fields_accept_no_space() -> None:
         "connection/line_form.py": {"NumberInput", "WordField"},
         "choosing.py": {"WordField"},
         "parameters/screen.py": {"WordField"},
-        "blocks/pick_parameter.py": {"WordField"},
+        "dialogs/pick_parameter.py": {"WordField"},
         "frames/frame_list.py": {"WordField"},
     }
     numbers = {

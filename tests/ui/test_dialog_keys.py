@@ -21,7 +21,6 @@ from tui.app import DrivePanelApp
 from tui.bus.errors import LinkSyntaxError
 from tui.drive.profile import library
 from tui.drive.settings.edits import Edits
-from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.bundle import BundleScreen
 from tui.screens.choosing import Palette
 from tui.screens.command.command_keys import OptionsScreen
@@ -32,6 +31,7 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
+from tui.screens.dialogs.pick_parameter import PickParameter
 from tui.screens.dialogs.question import KeyQuestion, Question
 from tui.screens.frame import Framed
 from tui.screens.frames.choice import choice_of

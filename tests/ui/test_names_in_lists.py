@@ -13,17 +13,17 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.edits import Edit, Edits
 from tui.drive.settings.selection import Choice, FilterId, chosen_codes, group_order, rows
-from tui.screens.blocks.pick_parameter import (
+from tui.screens.blocks.view import table_lines
+from tui.screens.choosing import AROUND_PALETTE, WIDEST_PALETTE, action_lines
+from tui.screens.command.teaching import teach_lines
+from tui.screens.control.view import change_lines
+from tui.screens.dialogs.pick_parameter import (
     AROUND,
     BESIDE_NAME,
     LISTED_MOST,
     WIDEST,
     pick_lines,
 )
-from tui.screens.blocks.view import table_lines
-from tui.screens.choosing import AROUND_PALETTE, WIDEST_PALETTE, action_lines
-from tui.screens.command.teaching import teach_lines
-from tui.screens.control.view import change_lines
 from tui.screens.faults.doctor import LABEL, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
 from tui.screens.faults.view import stored_lines

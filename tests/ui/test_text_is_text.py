@@ -20,11 +20,11 @@ from tests.sources import calls_of
 from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.drive.settings.restore_plan import RestoreItem
-from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.choosing import Palette
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.pick_parameter import PickParameter
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.monitor.screen import MonitorScreen

@@ -153,7 +153,7 @@ class BlocksScreen(BlockKeys):
 
     def action_pick(self) -> None:
         """Choose the parameter that the slot is mapped to."""
-        from .pick_parameter import PickParameter
+        from ..dialogs.pick_parameter import PickParameter
 
         block, place = self._block, self._at
         if block is None:

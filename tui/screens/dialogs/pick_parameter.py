@@ -20,7 +20,7 @@ from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
-from ..dialogs.question import Question, hint, matches_text
+from .question import Question, hint, matches_text
 
 LISTED_MOST = 100
 """Parameters that are listed at most; a search shows the others."""
