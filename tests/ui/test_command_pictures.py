@@ -157,6 +157,7 @@ OVER = {
     "hand-back": ("armed", ["g"]),
     "control-source": ("armed", ["6", "down"]),
     "control-switched": ("no-effect", ["6"]),
+    "communication-map": ("armed", ["6", "tab"]),
     "control-source-sure": ("armed", ["6", "down", "enter"]),
     "faults": ("tripped", ["5"]),
     "faults-none": ("armed", ["5"]),

@@ -302,7 +302,7 @@ SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}
     [
         pytest.param(name, marks=pytest.mark.sweep if name in SWEPT else ())
         for name in EVERYWHERE
-        if name not in (OPENING, LISTENING)  # there is nothing to write to
+        if name not in (OPENING, LISTENING, "map")  # there is nothing to write to
     ],
 )
 async def test_no_letter_writes_without_confirmation(screen: str) -> None:
@@ -369,7 +369,8 @@ SHOW = {
     },
     "scanner": {"up", "down", "tab", "left", "right"},
     "faults": {"up", "down", "left", "right", "tab"},
-    "control": set(),
+    "control": {"tab"},
+    "map": {"left", "right", "tab"},
     "frames": {*ARROWS, "tab"},
     "listening": {*ARROWS, "tab"},
     "messages": ARROWS,

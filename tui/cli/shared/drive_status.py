@@ -17,7 +17,7 @@ from .errors import DONE, LINE_TROUBLE
 from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
 from .rows import Column
-from .status_words import status_words, word_fields, word_rows
+from .status_words import word_fields, word_rows
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -172,13 +172,14 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
 
 def _codes(profile: Profile) -> list[str]:
     from tui.drive.chart import watched_codes
+    from tui.drive.communication_words import communication_words
     from tui.drive.hints import alarm_words
     from tui.drive.orders import deciding_codes, interlock_codes
 
     channels = [profile.quantity(quantity) for quantity in CHANNEL_NAMES]
     codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
     codes += [parameter.code for parameter in channels if parameter is not None]
-    codes += [parameter.code for parameter in status_words(profile).values()]
+    codes += [parameter.code for parameter in communication_words(profile).values()]
     codes += alarm_words(profile)
     codes += deciding_codes(profile)
     for chart in profile.data.charts:

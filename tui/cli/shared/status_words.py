@@ -5,26 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from tui.drive.communication_words import communication_words
 from tui.drive.values import NOT_AVAILABLE, set_bits
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
-    from tui.drive.profile.schema import Parameter, Quantity
     from tui.session.reading import Reading
 
     from ..documents.parts import StatusWordField
-
-STATUS_WORDS: tuple[Quantity, ...] = (
-    "command_word", "command_word_2", "extended_command_word",
-    "status_word", "status_word_2", "status_word_3", "extended_status_word",
-)  # fmt: skip
-"""Quantities of the command and status words of all families."""
-
-
-def status_words(profile: Profile) -> dict[Quantity, Parameter]:
-    """Return the command and status words that a family has."""
-    found = ((quantity, profile.quantity(quantity)) for quantity in STATUS_WORDS)
-    return {quantity: parameter for quantity, parameter in found if parameter is not None}
 
 
 def word_rows(profile: Profile, readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
@@ -33,7 +21,7 @@ def word_rows(profile: Profile, readings: Mapping[str, Reading]) -> list[tuple[s
     `-----` if it was not read just now.
     """
     rows = []
-    for parameter in status_words(profile).values():
+    for parameter in communication_words(profile).values():
         reading = readings.get(parameter.code)
         if reading is None or reading.raw is None or reading.quality != "good":
             rows.append((parameter.code, NOT_AVAILABLE))
@@ -50,7 +38,7 @@ def word_fields(
     from ..documents.parts import StatusWordField
 
     fields: dict[str, StatusWordField | None] = {}
-    for quantity, parameter in status_words(profile).items():
+    for quantity, parameter in communication_words(profile).items():
         reading = readings.get(parameter.code)
         raw = None if reading is None or reading.quality != "good" else reading.raw
         fields[quantity] = (

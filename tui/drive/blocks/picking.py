@@ -50,17 +50,22 @@ def raw_named(profile: Profile, block: Block, text: str) -> int:
     return raw_of(profile, block, parameter)
 
 
-def choices(profile: Profile, block: Block, search: str = "") -> list[Parameter]:
+def choices(profile: Profile, block: Block | None, search: str = "") -> list[Parameter]:
     """Return the parameters that a slot of the block can select, best matches first.
+
+    Without a block, these are all parameters that can be read.
 
     A search finds codes, numbers, addresses and names; each result contains all words of the
     search.
     """
-    if block.selects_by == "choice":
+    if block is not None and block.selects_by == "choice":
         offered = [profile[choice.parameter] for choice in block.choices]
     else:
         offered = sorted(profile.parameters, key=lambda parameter: parameter.address)
-    fitting = [p for p in offered if not reason_against(profile, block, p)]
+    if block is None:
+        fitting = [p for p in offered if p.access != "w"]
+    else:
+        fitting = [p for p in offered if not reason_against(profile, block, p)]
     if not search.split():
         return fitting
     scores = parameter_search(profile).scores(search)

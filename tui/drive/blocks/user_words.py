@@ -16,7 +16,7 @@ from .assignment import MappingError
 from .picking import NONE
 
 COUNT = 4
-WordFormat = Literal["hex", "signed", "unsigned"]
+WordFormat = Literal["hex", "signed", "unsigned", "bits"]
 FORMATS: tuple[WordFormat, ...] = get_args(WordFormat)
 
 
@@ -34,6 +34,8 @@ class UserWord:
         word &= 0xFFFF
         if self.format == "hex":
             return f"{word:04X} hex"
+        if self.format == "bits":
+            return " ".join(f"{word >> shift & 0xF:04b}" for shift in (12, 8, 4, 0))
         return str(word - 0x10000 if self.format == "signed" and word > 0x7FFF else word)
 
 

@@ -160,8 +160,8 @@ class BlockKeys(ArmingKeys):
             return f"{name if word.address else 'none'} {word.format}"
 
         about = (
-            "Four words with commas between. Each is a code or address, then hex, signed or"
-            " unsigned. ----- means: not assigned, unknown to the drive, or protected."
+            "Four words with commas between. Each is a code or address, then hex, signed,"
+            " unsigned or bits. ----- means: not assigned, unknown to the drive, or protected."
         )
         text = ", ".join(spelled(word) for word in self.block_editor.words)
         self.app.push_screen(Ask("User words", wrong, text=text, about=about), given)

@@ -8,7 +8,7 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.drive.blocks.assignment import UNUSED, Assignment, describe, slot_target
-from tui.drive.blocks.user_words import UserWords
+from tui.drive.blocks.user_words import UserWord, UserWords
 from tui.drive.blocks.wire_cost import Saving, Stretch, block_request, microseconds, together
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
@@ -294,6 +294,8 @@ def user_word_lines(block_editor: BlockEditor, words: UserWords, width: int) -> 
         parameter = block_editor.session.profile.at(word.address) if word.address else None
         name = parameter.code if parameter else f"W{word.address}" if word.address else "none"
         shown = word.text(raw)
+        if len(name) + len(shown) >= room:  # bits, in a narrow terminal
+            shown = UserWord(word.address).text(raw)
         text.append(f"{name} ", FAINT)
         style = FAINT if shown == NOT_AVAILABLE else PLAIN
         text.append(f"{shown:<{max(0, room - len(name) - 1)}}", style)

@@ -11,6 +11,7 @@ if TYPE_CHECKING:
 
     from tui.session.console import DriveConsole
 
+CHOOSE_WORD = "Choose the parameter that this word shows."
 PROVE = "Test the drive's reaction to a communication loss. Needs arming; asks first."
 WRITE_SOURCE = "Write the chosen configuration. Needs arming and standstill; asks first."
 
@@ -33,6 +34,13 @@ def no_sources(console: DriveConsole) -> str:
     )
 
 
+def create_map(console: DriveConsole) -> Screen[None]:
+    """Create the communication map of a drive."""
+    from .map_screen import MapScreen
+
+    return MapScreen(console)
+
+
 REGISTERED = (
     Registration(
         title="Control",
@@ -45,7 +53,22 @@ REGISTERED = (
             *ARMING,
             *key_rows(("prove", "P", "test", PROVE)),
             Action("write_chosen", "enter", "write", WRITE_SOURCE, bound=False),
+            *key_rows(("other_page", "tab", "map", "Show the communication map.")),
             *key_rows(("leave", "escape", "back", "Go back to Monitor.")),
+        ),
+    ),
+    Registration(
+        title="Map",
+        create=create_map,
+        actions=(
+            Action("choose_word", "enter", "choose", CHOOSE_WORD, bound=False),
+            *key_rows(
+                ("turn_format(1)", "right", "format", "Show the word in the next format."),
+                ("turn_format(-1)", "left", "", "Show the word in the previous format."),
+                ("clear_word", "delete", "clear", "Clear the word under the cursor."),
+                ("other_page", "tab", "switches", "Go back to the switches."),
+                ("leave", "escape", "back", "Go back to Control."),
+            ),
         ),
     ),
 )

@@ -324,6 +324,12 @@ class ControlSourceScreen(OrderKeys):
         """Write on Enter in the list."""
         self.action_write_chosen()
 
+    def action_other_page(self) -> None:
+        """Show the communication map."""
+        from .map_screen import MapScreen
+
+        self.app.push_screen(MapScreen(self.console))
+
     def action_prove(self) -> None:
         """Ask, then test the drive's reaction to a communication loss."""
         latest = self.console.latest

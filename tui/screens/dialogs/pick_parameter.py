@@ -1,4 +1,4 @@
-"""Dialog that chooses the parameter of a slot: a list that filters while typing."""
+"""Dialog that chooses a parameter: a list that filters while typing."""
 
 from __future__ import annotations
 
@@ -22,6 +22,8 @@ from tui.widgets.plain import Plain, entry
 
 from .question import Question, hint, matches_text
 
+UNUSED_SLOT = " none      the slot is unused"
+NO_WORD_HERE = " none      no word"
 LISTED_MOST = 100
 """Parameters that are listed at most; a search shows the others."""
 WIDEST = 92
@@ -29,17 +31,19 @@ WIDEST = 92
 BESIDE_NAME, AROUND = 29, 6
 """Cells of a line without its name, and of the dialog around a line."""
 PICK_HINT = hint(("Up, Down", "Choose"), JOINS_KEY, ("Enter", "Stage"), ("Esc", "Cancel"))
+WORD_HINT = hint(("Up, Down", "Choose"), JOINS_KEY, ("Enter", "Show"), ("Esc", "Cancel"))
 
 
 class PickParameter(Question[str | None]):
-    """Answers with the code of a parameter, with `none` to clear the slot, or with None."""
+    """Answers with the code of a parameter, with `none` to clear the place, or with None."""
 
     BINDINGS: ClassVar = [
         Binding("up", "step(-1)", "up", show=False, priority=True),
         Binding("down", "step(1)", "down", show=False, priority=True),
     ]
 
-    def __init__(self, profile: Profile, block: Block, slot: str) -> None:
+    def __init__(self, profile: Profile, block: Block | None, slot: str) -> None:
+        """`slot` is a slot of the block, or the place of a word without one."""
         super().__init__()
         self._profile, self._block, self._slot = profile, block, slot
         self._found: list[Parameter] = []
@@ -47,11 +51,13 @@ class PickParameter(Question[str | None]):
     def dialog(self) -> ComposeResult:
         """A search field, and its results."""
         with Vertical(id="dialog"):
-            yield Plain(f"Map {self._slot} to", id="question")
+            yield Plain(
+                f"Map {self._slot} to" if self._block else f"Show as {self._slot}", id="question"
+            )
             yield WordField(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
-            yield Plain(PICK_HINT, id="hint")
+            yield Plain(PICK_HINT if self._block else WORD_HINT, id="hint")
 
     def on_mount(self) -> None:
         """List every parameter that the slot can be mapped to."""
@@ -69,7 +75,7 @@ class PickParameter(Question[str | None]):
         options = self.query_one(OptionList)
         options.clear_options()
         lines = pick_lines(self._found, min(WIDEST, self.app.size.width) - AROUND)
-        unused = [] if search else [Text(" none      the slot is unused", FAINT)]
+        unused = [] if search else [Text(UNUSED_SLOT if self._block else NO_WORD_HERE, FAINT)]
         options.add_options([entry(line) for line in (*unused, *lines)])
         options.highlighted = 0 if options.option_count else None
         self.query_one("#count", Plain).update(matches_text(len(every), LISTED_MOST))

@@ -17,6 +17,8 @@ SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
 BLOCKS, MESSAGES, WIRING = "scanner", "messages", "wiring"
 OPENING = "opening"
 """Monitor before its drive is known."""
+MAP = "map"
+"""The communication map, a page of Control."""
 LISTENING = "listening"
 """The mode of Frames for a monitored line, on which nothing is sent."""
 
@@ -38,7 +40,15 @@ SHOWING = frozenset(
     {
         *("goto", "find", "messages", "wiring", "command_palette", "help", "redraw"),
         *("move", "page", "end", "group", "scroll", "section", "move_record", "filter"),
-        *("other_page", "other_table", "next_word", "trend_window", "cursor", "move_cursor"),
+        *(
+            "other_page",
+            "other_table",
+            "next_word",
+            "trend_window",
+            "cursor",
+            "move_cursor",
+            "turn_format",
+        ),
     }
 )
 """Actions that move a cursor or show something, and do nothing else: their keys act at once.
