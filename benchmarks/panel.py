@@ -70,7 +70,7 @@ def word_sign(text: str) -> tuple[object, ...]:
             bits = takewhile(re.compile(r" +\d+ [●·] ").match, rows[y + 1 :])
             return title[1], *(row[5:13].strip() for row in bits)
     named = ("All values", "output")
-    return next(((name,) for name in named if any(name in row for row in rows[7:10])), ())
+    return next(((name,) for name in named if any(name in row for row in rows[7:11])), ())
 
 
 def saying(*words: str) -> Callable[[str], tuple[object, ...]]:
