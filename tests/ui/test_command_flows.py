@@ -282,7 +282,7 @@ async def test_trip_has_one_time_on_every_screen() -> None:
         (event,) = [item for item in made.app.events.events if item.text.startswith("Tripped on")]
         assert event.wall == fault.wall
         await made.pilot.press("5")
-        await until(made.pilot, lambda: f"{fault.when}, last read " in shown(made.app, "doctor"))
+        await until(made.pilot, lambda: f"{fault.when}, just now" in shown(made.app, "doctor"))
 
 
 async def test_reset_without_a_fault_says_so() -> None:

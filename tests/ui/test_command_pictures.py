@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -17,6 +18,7 @@ from tui.session.fleet import FoundDrive
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment, Recorder
 from tui.session.work import Outcome, OutcomeKind
+from tui.terminal.abilities import EVERYTHING, Abilities
 
 from . import fakes
 from .test_pictures import SIZES, WATCH, Compare
@@ -58,6 +60,7 @@ REMOTE = {**fakes.READY, "CCC": 1, "CRC": 1}
 RUNNING = {"raws": fakes.RUNNING}
 SWITCHED = {"CHCF": 2, "CCS": 133, "CCC": 1, "LRS7": 0b0101, "IL1R": 1}
 """Commanded by the terminals while input LI5 is open."""
+BRAKING = {"DEC": 5, "DE2": 50, "BRA": 0, "VBR": 820, "VCAL": 6}
 LIMITS = {"HSP": 500, "LSP": 0, "ACC": 30, "INR": 1, "TFR": 600, "FRS": 500}
 STATES: dict[str, tuple[dict[str, Any], KeyInput, StopReport | None, bool]] = {
     "armed": ({"raws": fakes.READY}, KeyInput(57), None, False),
@@ -109,10 +112,12 @@ def trip() -> FaultRecord:
         address=8502, old_raw=0, old="0.0 Hz", new_raw=500, new="50.0 Hz", answer="ok",
         read_back=500, why="reference",
     )  # fmt: skip
-    return FaultRecord(0.0, wall, profile.fault(18), codes, headings, (*moments, end), (entry,))
+    before = fakes.readings_of(profile, {**fakes.RUNNING, "HMIS": 6}, fakes.NOW - 20)
+    fault = profile.fault(18)
+    return FaultRecord(0.0, wall, fault, codes, headings, (*moments, end), (entry,), before)
 
 
-def panel(name: str) -> tuple[Any, MonitorScreen]:
+def panel(name: str, abilities: Abilities = EVERYTHING) -> tuple[Any, MonitorScreen]:
     """The panel on a drive in that state."""
     how, given, report, unseen = STATES[name]
     snapshot = fakes.snapshot_of(library.load("atv71"), **how)
@@ -122,8 +127,10 @@ def panel(name: str) -> tuple[Any, MonitorScreen]:
         console.commander.given.note_command("CMD", 0x000F)
         console.session.image.confirm("CMD", 0, fakes.NOW)
     record = trip() if unseen else None
-    console.recorder = Recorder(console.session, console.journal, record, not unseen)
-    app = fakes.app_of(kind=fakes.Easel)
+    console.recorder = Recorder(
+        console.session, console.journal, record, not unseen, since=fakes.NOW - 12
+    )
+    app = fakes.app_of(abilities=abilities, kind=fakes.Easel)
     app.opened = fakes.opened()
     found = FoundDrive(fakes.ATV71, console)
     app.fleet = fakes.StillFleet(found, line_watch=fakes.FakeLineWatch(WATCH))
@@ -181,9 +188,26 @@ def test_screens_of_commanding(
     size: tuple[int, int],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    app, show = shown_over(screen, monkeypatch)
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+@pytest.mark.parametrize("size", [(60, 16), (200, 60)], ids=["60x16", "200x60"])
+@pytest.mark.parametrize("screen", ["faults", "faults-none"])
+def test_faults_at_other_sizes(
+    snap_compare: Compare, screen: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, show = shown_over(screen, monkeypatch)
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+def shown_over(
+    screen: str, monkeypatch: pytest.MonkeyPatch, abilities: Abilities = EVERYTHING
+) -> tuple[Any, Callable[[Pilot[None]], Awaitable[None]]]:
+    """The panel on a drive, and what opens a screen of OVER on it."""
     state, keys = OVER[screen]
-    app, monitor = panel(state)
-    held = {**fakes.RUNNING, **fakes.CHANNELS, **fakes.STORED, **LIMITS}
+    app, monitor = panel(state, abilities)
+    held = {**fakes.RUNNING, **fakes.CHANNELS, **fakes.STORED, **BRAKING, **LIMITS}
     if screen == "control-switched":
         held |= SWITCHED
     monitor.session.image.confirm("LFR", 300, fakes.NOW)
@@ -208,4 +232,4 @@ def test_screens_of_commanding(
         await pilot.pause()
         await pilot.pause()
 
-    assert snap_compare(app, terminal_size=size, run_before=show)
+    return app, show

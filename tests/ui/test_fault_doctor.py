@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import pytest
 
 from tests.ui.fakes import NOW, readings_of
-from tui.drive.hints import codes_to_read, reset_text
+from tui.drive.hints import reset_text
 from tui.drive.profile import library
-from tui.screens.faults.doctor import LABEL, _history, doctor_lines
+from tui.screens.faults.cause_rows import EXCLUDED, LIKELIEST, OPEN
+from tui.screens.faults.doctor import TOO_FEW, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
+from tui.screens.faults.history import history_rows
+from tui.screens.faults.next_steps import ARM
+from tui.screens.faults.parts import LABEL
+from tui.screens.faults.screen import FaultsScreen
+from tui.session.drive import DriveSession
+from tui.session.journal import Entry
+from tui.session.monitor.fault_record import FaultRecord
+from tui.session.monitor.trend import TrendPoint
+from tui.session.monitor.watched import SeenTrip, Watched
 
 from .test_frame import panel
 
 ATV71 = library.load("atv71")
+BRAKING = {"BRA": 1, "VCAL": 4, "ULP0": 2280, "DEC": 30}
 
 
 def view(raw: int | None, **more: object) -> DoctorView:
@@ -27,6 +39,24 @@ def reported(shown: DoctorView, width: int = 80, height: int = 20) -> str:
     return "\n".join(line.plain.rstrip() for line in doctor_lines(shown, width, height))
 
 
+def sections(text: str) -> dict[str, list[str]]:
+    """Rows of a page by the heading or name of their part."""
+    found: dict[str, list[str]] = {}
+    name = ""
+    for row in text.splitlines():
+        first = row.strip().partition(" ")[0]
+        if first in ("Why", "Values", "Next", "Check", "Enter", "x", "Before", "Tab", "History"):
+            name = first
+        found.setdefault(name, []).append(row)
+    return found
+
+
+def reset_shown(text: str) -> str:
+    """Text of the reset on a page."""
+    rows = sections(text)["x"]
+    return " ".join(" ".join(rows).split()).removeprefix("x ")
+
+
 @pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "atv71"])
 def test_every_fault_fits_80_columns(family: str) -> None:
     profile = library.load(family)
@@ -35,73 +65,102 @@ def test_every_fault_fits_80_columns(family: str) -> None:
         if help_ is None:
             continue
         shown = view(None, profile=profile, fault=fault)
-        text = reported(shown, 80, 40)
+        text = reported(shown, 80, 50)
         for part in (*help_.probable, *help_.check, *(look.why for look in help_.look_at)):
             assert part in text, (fault.code, part)
-        assert "…" not in text.partition("Probably")[2], fault.code
-        assert all(line.cell_len <= 80 for line in doctor_lines(shown, 80, 40))
+        assert "…" not in text.partition("Why")[2], fault.code
+        assert all(line.cell_len <= 80 for line in doctor_lines(shown, 80, 50))
+
+
+@pytest.mark.parametrize("width", [60, 80, 120, 200])
+@pytest.mark.parametrize("height", [3, 8, 12, 20, 36, 56])
+def test_page_fits_its_place_and_keeps_the_likeliest_cause(width: int, height: int) -> None:
+    read = readings_of(ATV71, {**BRAKING, "INR": 1, "ETI": 4}, NOW)
+    for cursor in (None, 0, 4, 9, 12):
+        shown = view(18, readings=read, now=NOW, cursor=cursor)
+        lines = doctor_lines(shown, width, height)
+        assert len(lines) <= height
+        assert all(line.cell_len <= width for line in lines)
+        if height >= 12:
+            text = "\n".join(line.plain for line in lines)
+            assert f"{LIKELIEST} The braking is too sudden for the inertia" in text
+            assert "x works now" in text
+        if height >= 12 and cursor is not None and cursor < len(shown.rows):
+            assert f"\n  {shown.rows[cursor].code} " in text
 
 
 def test_fault_without_a_number_is_named_before_its_causes() -> None:
     profile = library.load("powerdrive")
     (help_,) = profile.guide.data.faults
-    text = reported(view(None, profile=profile, present=True), 120)
-    first, second = text.partition("Probably")[2].splitlines()[:2]
+    first, second = sections(reported(view(None, profile=profile, present=True), 120))["Why"][1:3]
     assert first.strip() == help_.name
     assert help_.probable[0] in second
 
 
 def test_general_practice_is_marked() -> None:
-    practice = reported(view(1))
-    assert "practice" in practice.partition("Probably")[2].splitlines()[0]
-    guide = reported(view(18))
-    assert guide.partition("Probably")[2].splitlines()[0].endswith("guide")
-    assert guide.partition("Check")[2].splitlines()[0].endswith("practice")
-    assert guide.partition("Reset")[2].splitlines()[0].endswith("practice")
+    assert "general practice" in sections(reported(view(1)))["Why"][0]
+    guide = sections(reported(view(18), 80, 30))
+    assert "public guide" in guide["Why"][0]
+    assert guide["Check"][0].endswith("(practice)")
+    assert guide["x"][-1].endswith("(practice)")
 
 
 def test_drive_reports_if_a_reset_is_possible() -> None:
     for raw, output in ((0x0004, "x works now"), (0, "Not yet: the drive reports")):
-        text = reported(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW)))
+        text = reset_shown(reported(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW))))
         assert output in text
-        assert "practice" not in text.partition("Reset")[2].splitlines()[0]
+        assert "practice" not in text
     old = {
         code: reading.aged(NOW + 60, 6.0)
         for code, reading in readings_of(ATV71, {"ETI": 4}, NOW).items()
     }
-    text = reported(view(9, readings=old)).replace(" practice", "")
-    assert "x has no effect" in " ".join(text.split())
+    assert "x has no effect" in reset_shown(reported(view(9, readings=old)))
 
 
-@pytest.mark.parametrize(("width", "height"), [(60, 16), (60, 12), (80, 20), (80, 12)])
+def test_next_key_says_what_a_reset_needs() -> None:
+    read = readings_of(ATV71, {"ETI": 4}, NOW)
+    assert reset_shown(reported(view(9, readings=read))).startswith(f"{ARM} x works now")
+    armed = reset_shown(reported(view(9, readings=read, armed=True)))
+    assert armed.startswith("x works now")
+    barred = reset_shown(reported(view(9, readings=read, barred="The line is read-only.")))
+    assert barred.startswith("Not possible now: The line is read-only. x works now")
+    atv21 = library.load("atv21")
+    wait = reset_shown(reported(view(None, profile=atv21, fault=atv21.fault(14))))
+    assert "Wait about 120 s before it." in wait
+
+
+@pytest.mark.parametrize("width", [60, 80])
+@pytest.mark.parametrize("height", range(2, 21))
 @pytest.mark.parametrize("raw", [9, 18, 22])
 def test_reset_text_is_never_cut_off(raw: int, width: int, height: int) -> None:
     for eti in (None, 0, 4):
         readings = {} if eti is None else readings_of(ATV71, {"ETI": eti}, NOW)
         shown = view(raw, readings=readings)
         text = reported(shown, width, height)
-        whole = reset_text(shown.help, shown.ready, "x", shown.follows).text
-        ends = " ".join(text.partition("Reset")[2].partition("History")[0].split())
-        assert whole in ends.replace(" practice", ""), text
         assert len(text.splitlines()) <= height
+        if TOO_FEW in text:
+            assert height < 9, text
+            continue
+        assert reset_text(shown.help, shown.ready, "x", shown.follows).text in reset_shown(text)
 
 
 def test_input_that_caused_the_trip_fits_80_columns() -> None:
     """'Logic input ...' and 16#000C did not show where to look."""
     external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
-    text = reported(view(external.raw, readings=read))
-    assert "ETF    Logic input LI4 input or bit that trips it      Enter open" in text
-    assert "IL1R   LI3, LI4        present state of the inputs" in text
+    rows = sections(reported(view(external.raw, readings=read)))["Values"]
+    assert "input or bit that trips it" in rows[1]
+    assert rows[1].endswith(" Logic input LI4")
+    assert next(row for row in rows if "IL1R" in row).endswith(" LI3, LI4")
     still = reported(view(external.raw, readings=readings_of(ATV71, {"IL1R": 0}, NOW)))
-    assert "IL1R   none " in still
+    assert next(row for row in still.splitlines() if "IL1R" in row).endswith(" none")
 
 
 def test_alarm_has_causes_and_parameters() -> None:
     text = reported(view(None, present=False, alarms=[("LRS6", 8, "Undervoltage alarm")]))
     for part in ("UNDERVOLTAGE ALARM", "alarm, no fault", "Mains low or a dip", "ULN", "practice"):
         assert part in text
-    assert "Reset" not in text
+    assert "x" not in sections(text)
     both = view(18, alarms=[("LRS6", 8, "Undervoltage alarm")])
     assert "OVERBRAKING" in reported(both)
     assert "UNDERVOLTAGE" not in reported(both)
@@ -135,7 +194,7 @@ async def test_key_line_stays_at_the_bottom() -> None:
 def test_drive_without_a_fault_shows_no_causes() -> None:
     text = reported(view(None, present=False))
     assert "No fault." in text
-    assert "Probably" not in text
+    assert "Why" not in text
 
 
 def test_family_without_a_history_reads_none() -> None:
@@ -158,47 +217,191 @@ def test_earlier_fault_is_not_shown_as_the_last(family: str) -> None:
     assert profile.data.faults.stored[0] == [], "EP1 belongs to fault n-1"
 
 
-BRAKING = {"BRA": 1, "VCAL": 4, "ULP0": 2280, "DEC": 30}
+def causes(shown: DoctorView, width: int = 100) -> list[str]:
+    """Sign and text of each cause, in the order of the page."""
+    rows = sections(reported(shown, width, 40))["Why"][1:]
+    return [row.strip() for row in rows if row.strip()[0] in (LIKELIEST, OPEN, EXCLUDED)]
 
 
-def test_advice_excluded_by_a_value_is_not_shown() -> None:
-    fault = readings_of(ATV71, BRAKING, NOW)
-    text = reported(view(18, readings=fault), 100, 30)
-    assert "(ruled out, BRA Yes) No resistor: set BRA on" in text
-    assert "(ruled out, ULN 228.0 V (170 to 240 V) at the trip) Mains voltage already high" in text
-    assert text.index("The load drives the motor") < text.index("Mains voltage already high")
-    open_ = reported(
-        view(18, readings=readings_of(ATV71, {**BRAKING, "BRA": 0, "ULP0": 2580}, NOW))
-    )
-    assert "ruled out" not in open_
-    assert "No resistor: set BRA on" in open_
+def test_causes_are_weighed_and_excluded_ones_are_last_and_dim() -> None:
+    read = readings_of(ATV71, {**BRAKING, "DEC": 5, "INR": 1}, NOW)
+    shown = view(18, readings=read, now=NOW)
+    rows = causes(shown)
+    assert rows[0].startswith(f"{LIKELIEST} The braking is too sudden for the inertia")
+    assert rows[0].endswith("DEC 0.5 s (up to 1 s)")
+    assert rows[1].startswith(f"{OPEN} The load drives the motor")
+    assert rows[-1].startswith(f"{EXCLUDED} Mains voltage already high")
+    assert rows[-1].endswith("ULN 228.0 V (170 to 240 V) at the trip")
+    text = reported(shown, 100, 40)
+    assert "3 of 4 left" in text
+    assert "× No resistor: set BRA on, if the process allows it (ruled out, BRA Yes)" in text
+    (line,) = [line for line in doctor_lines(shown, 100, 40) if "already high" in line.plain]
+    assert any("strike" in str(span.style) for span in line.spans)
+    high = view(18, readings=readings_of(ATV71, {**BRAKING, "BRA": 0, "ULP0": 2580}, NOW))
+    assert not [row for row in causes(high) if row.startswith(EXCLUDED)]
 
 
-def test_unknown_value_or_older_fault_excludes_nothing() -> None:
-    assert "ruled out" not in reported(view(18))
-    without_range = {code: raw for code, raw in BRAKING.items() if code not in ("VCAL", "BRA")}
-    assert "ruled out" not in reported(view(18, readings=readings_of(ATV71, without_range, NOW)))
-    older = view(18, present=False, readings=readings_of(ATV71, BRAKING, NOW))
-    assert "at the trip" not in reported(older, 100, 30)
-    assert "BRA Yes)" in reported(older, 100, 30)
+def test_supported_cause_moves_to_the_top() -> None:
+    before = causes(view(18, readings=readings_of(ATV71, {"VCAL": 4, "ULP0": 2280}, NOW)))
+    assert before[0].startswith(f"{LIKELIEST} The braking is too sudden")
+    high = view(18, readings=readings_of(ATV71, {"VCAL": 4, "ULP0": 2800}, NOW))
+    assert causes(high)[0].startswith(f"{LIKELIEST} Mains voltage already high")
+    assert "general practice" in reported(high)
 
 
-def test_current_value_does_not_exclude_a_past_cause() -> None:
+def test_old_value_or_older_fault_excludes_nothing() -> None:
+    assert not [row for row in causes(view(18)) if row.startswith(EXCLUDED)]
+    read = readings_of(ATV71, BRAKING, NOW)
+    old = {code: reading.aged(NOW + 60, 6.0) for code, reading in read.items()}
+    rows = causes(view(18, readings=old, now=NOW + 60))
+    assert not [row for row in rows if row.startswith(EXCLUDED)]
+    assert rows[-1].endswith("not known: ULN, VCAL")
+    older = causes(view(18, present=False, readings=read))
+    assert not [row for row in older if row.startswith(EXCLUDED)]
+
+
+def test_value_of_a_failed_cycle_excludes_nothing() -> None:
+    read = readings_of(ATV71, {"ULN": 2280, "VCAL": 4}, NOW)
+    assert causes(view(19, monitored=read))[-1].startswith(EXCLUDED)
+    stale = {code: reading.aged(NOW + 60, 6.0) for code, reading in read.items()}
+    assert not [r for r in causes(view(19, monitored=stale)) if r.startswith(EXCLUDED)]
+
+
+def test_present_value_does_not_exclude_a_past_cause() -> None:
     profile = library.load("atv312")
     now = readings_of(profile, {"ULn": 2280, "VCAL": 2}, NOW)
-    text = reported(view(None, profile=profile, fault=profile.fault(18), readings=now), 100, 30)
-    assert "(not now, ULn 228.0 V (170 to 240 V)) Mains voltage already high" in text
+    rows = causes(view(None, profile=profile, fault=profile.fault(18), readings=now))
+    assert rows[-1].endswith("not now: ULn 228.0 V (170 to 240 V)")
+
+
+def test_setting_written_since_the_trip_is_no_evidence() -> None:
+    read = readings_of(ATV71, {"DEC": 5, "INR": 1}, NOW)
+    assert "DEC 0.5 s" in causes(view(18, readings=read))[0]
+    assert "DEC 0.5 s" not in causes(view(18, readings=read, changed=frozenset({"DEC"})))[0]
+
+
+def record(**raws: int) -> FaultRecord:
+    """A trip into an overvoltage after a cycle with these values."""
+    before = readings_of(ATV71, raws, NOW - 1)
+    return FaultRecord(NOW, 0.0, ATV71.fault(18), (), (), (), (), before)
+
+
+def test_values_at_the_trip_and_now_are_in_two_columns() -> None:
+    read = readings_of(ATV71, {"ULP0": 2280, "LCP0": 29, "DEC": 5, "INR": 1}, NOW)
+    monitored = readings_of(ATV71, {"ULN": 2284, "LCR": 0, "OTR": 0}, NOW)
+    shown = view(18, readings=read, monitored=monitored, now=NOW, record=record(OTR=-940, LCR=99))
+    rows = {row.split()[0]: row.split()[-4:] for row in sections(reported(shown, 80, 40))["Values"]}
+    assert rows["ULP0"] == ["228.0", "V", "228.4", "V"]
+    assert rows["LCR"] == ["2.9", "A", "0.0", "A"], "what the drive stored precedes"
+    assert rows["OTR"] == ["~-94.0", "%", "0.0", "%"]
+    assert rows["DEC"][-2:] == ["0.5", "s"]
+
+
+def test_value_long_before_the_trip_shows_its_age_and_is_no_evidence() -> None:
+    late = record(ULN=2280, VCAL=4, LCR=99)
+    early = {"ULN": readings_of(ATV71, {"ULN": 2280}, NOW - 9)["ULN"]}
+    late = replace(late, before={**late.before, **early})
+    read = readings_of(ATV71, {"VCAL": 4}, NOW)
+    shown = view(18, readings=read, record=late, now=NOW)
+    assert "~228.0 V -8s" in reported(shown, 80, 40)
+    assert not [row for row in causes(shown) if row.startswith(EXCLUDED)]
+
+
+def test_value_that_the_drive_keeps_in_a_fault_is_that_of_the_trip() -> None:
+    profile = library.load("atv21")
+    read = readings_of(profile, {"FE27": 120}, NOW)
+    shown = view(None, profile=profile, fault=profile.fault(13), monitored=read, now=NOW)
+    (row,) = [row for row in reported(shown, 80, 40).splitlines() if row.startswith("  FE27")]
+    assert row.split()[-3:] == ["120", "%", "-----"]
+    assert causes(shown)[0].endswith("FE27 120 % (from 100 %) at the trip")
+
+
+def test_cursor_begins_at_the_value_that_decided() -> None:
+    read = readings_of(ATV71, {"VCAL": 4, "ULP0": 2800}, NOW)
+    shown = view(18, readings=read, now=NOW)
+    assert shown.rows[shown.at].code == "ULP0"
+    assert "Open ULP0" in sections(reported(shown, 80, 40))["Enter"][0]
+    assert replace(shown, cursor=1).at == 1
 
 
 def test_promoted_cause_is_not_shown_as_certain() -> None:
     readings = readings_of(ATV71, {"VCAL": 4, "ULP0": 2280}, NOW)
-    text = reported(view(19, readings=readings), 100, 30)
-    assert text.partition("Probably")[2].splitlines()[0].endswith("practice")
+    assert "general practice" in sections(reported(view(19, readings=readings)))["Why"][0]
 
 
-def test_values_that_exclude_advice_are_read_with_the_fault() -> None:
-    help_ = ATV71.guide.fault(18)
-    assert {"BRA", "ULP0", "VCAL"} <= set(codes_to_read(ATV71, help_))
+POINTS = tuple(TrendPoint(NOW - 100 + n, (float(n), n / 10, 50.0)) for n in range(90))
+
+
+def quiet(watched: Watched, **more: object) -> str:
+    """Page without a fault, in one line."""
+    shown = view(None, present=False, now=NOW, wall=1_795_259_250.0, watched=watched, **more)
+    return " ".join(reported(shown, 80, 20).split())
+
+
+def test_quiet_page_shows_the_last_trip_and_what_was_monitored() -> None:
+    text = quiet(Watched(NOW - 20, POINTS, journal_read=True))
+    (since,) = re.findall(r"None seen since (\S+)\. Earlier trips are not known: ", text)
+    assert f"By another program since {since}, by this panel since " in text
+    assert "Highest in the last 10 min: 89.0 Hz at " in text
+    assert "8.9 A at " in text
+    assert "Not read" not in text
+    trip = SeenTrip(1_795_259_250.0 - 720, "ObF Overbraking", tripped=True)
+    assert ", 12 min ago. Trips while no program" in quiet(Watched(NOW - 20, POINTS, trip))
+    seen = quiet(Watched(NOW - 20, (), SeenTrip(1_795_000_000.0, "", False, 1_795_000_060.0)))
+    assert "A fault whose code is not known, first seen " in seen
+    assert "3 days ago. Reset " in seen
+
+
+def test_quiet_page_does_not_claim_more_than_was_read() -> None:
+    assert "Not known: the drive has not been read yet." in quiet(Watched(None))
+    own = quiet(Watched(NOW - 20))
+    assert "By this panel since " in own
+    assert "yet: reading the journal" in own
+    gap = (*POINTS[:30], *POINTS[60:])
+    assert "Not read from " in quiet(Watched(NOW - 20, gap))
+    unread = tuple(replace(point, values=(None, None, None)) for point in POINTS)
+    assert "another program" not in quiet(Watched(NOW - 20, unread))
+
+
+def journal_entry(session: DriveSession, answer: str, time: str, *, device: int = 0) -> Entry:
+    return Entry(
+        time, session.line_text, device or session.device, "atv71", "ObF", 0, None, "", 18,
+        "Overbraking", answer, None, "", kind="fault",
+    )  # fmt: skip
+
+
+async def test_quiet_page_has_the_last_trip_from_the_journal() -> None:
+    async with panel() as made:
+        fleet = made.app.fleet
+        assert fleet is not None
+        session = fleet.consoles[0].session
+        for answer, time in (
+            ("tripped", "2026-01-05T10:00:00.000+00:00"),
+            ("reset", "2026-01-05T10:05:00.000+00:00"),
+        ):
+            fleet.journal.add(journal_entry(session, answer, time))
+        other = journal_entry(session, "tripped", "2026-01-06T10:00:00.000+00:00", device=99)
+        fleet.journal.add(other)
+        await made.on("5")
+        await made.until(lambda: "ObF Overbraking, tripped 05 Jan 2026" in made.shown("doctor"))
+        assert "Reset 05 Jan 2026" in " ".join(made.shown("doctor").split())
+        await made.until(lambda: "By this panel since " in made.shown("doctor"))
+
+
+async def test_new_trip_drops_the_values_stored_with_the_one_before() -> None:
+    async with panel() as made:
+        drive = made.simulation.drive(1)
+        drive.set("ULP0", 2900)
+        await made.on("5")
+        await made.until(lambda: "last" in made.shown("doctor"))
+        screen = made.app.screen
+        assert isinstance(screen, FaultsScreen)
+        await made.until(lambda: "ULP0" in screen._readings)
+        drive.provoke("OSF")
+        await made.until(lambda: "OVERVOLTAGE" in made.shown("doctor").upper())
+        await made.until(lambda: screen.doctor().record is not None)
+        known = screen.doctor().known
+        assert known.trip.get("ULN") != 2900
 
 
 @pytest.mark.parametrize("height", range(1, 12))
@@ -209,9 +412,9 @@ def test_history_shows_as_many_faults_as_fit_and_the_one_under_the_cursor(
     profile = library.load("atv71")
     raws = {code: 3 + number for number, code in enumerate(profile.data.faults.history)}
     shown = view(None, profile=profile, present=False, readings=readings_of(profile, raws, NOW))
-    shown = replace(shown, at=len(shown.look_at) + cursor)
+    shown = replace(shown, cursor=len(shown.rows) + cursor)
     count = len(shown.history)
-    lines = [line.plain for line in _history(shown, 80, height)]
+    lines = [line.plain for line in history_rows(shown, 80, height)]
     numbers = [line[LABEL:].split()[0].replace("last", "1") for line in lines]
     first = int(numbers[0])
     assert list(map(int, numbers)) == list(range(first, first + min(height, count)))

@@ -143,7 +143,7 @@ async def test_fault_is_new_until_faults_is_opened() -> None:
         await made.on("5")
         assert isinstance(made.app.screen, FaultsScreen)
         await made.until(lambda: made.app.fleet is not None and not made.app.fleet.alarms.unseen)
-        await made.until(lambda: "Probably" in made.shown("doctor"))
+        await made.until(lambda: "Why" in made.shown("doctor"))
         assert made.app.fleet.journal.recent == ()
 
 
@@ -151,7 +151,7 @@ async def test_enter_opens_the_parameter_of_a_fault() -> None:
     async with panel() as made:
         made.simulation.drive(1).provoke("ObF")
         await made.on("5")
-        await made.until(lambda: "Enter open" in made.shown("doctor"))
+        await made.until(lambda: "Open DEC" in made.shown("doctor"))
         await made.pilot.press("enter")
         await made.until(lambda: isinstance(made.app.screen, ParametersScreen))
         await made.until(lambda: made.shown("detail").lstrip().startswith("DEC"))

@@ -24,8 +24,9 @@ from tui.screens.dialogs.pick_parameter import (
     WIDEST,
     pick_lines,
 )
-from tui.screens.faults.doctor import LABEL, doctor_lines
+from tui.screens.faults.doctor import doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
+from tui.screens.faults.parts import LABEL
 from tui.screens.faults.view import stored_lines
 from tui.screens.keys.finding import find
 from tui.screens.keys.screens import SCREENS

@@ -8,6 +8,7 @@ from rich.color import ColorSystem
 from tests.sweeps import kept
 from tui.terminal.abilities import ASCII, Abilities
 
+from .test_command_pictures import shown_over
 from .test_monitor_pictures import SCENES, panel, show
 from .test_pictures import Compare
 
@@ -36,6 +37,14 @@ def test_monitor_on_a_poor_terminal(
     assert snap_compare(
         app, terminal_size=(80, 24), run_before=lambda pilot: show(app, screen, keys, pilot)
     )
+
+
+@pytest.mark.parametrize("terminal", ["vt100", "sixteen colors"])
+def test_faults_on_a_poor_terminal(
+    snap_compare: Compare, terminal: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, show_faults = shown_over("faults", monkeypatch, POOR[terminal])
+    assert snap_compare(app, terminal_size=(80, 24), run_before=show_faults)
 
 
 @pytest.mark.parametrize("terminal", ["plain signs", "vt100"])

@@ -31,6 +31,8 @@ class KnownValues:
     now: Mapping[str, int] = field(default_factory=dict)
     trip: Mapping[str, int] = field(default_factory=dict)
     """Values at the trip, by the code of the live parameter."""
+    before: Mapping[str, int] = field(default_factory=dict)
+    """Last values read before the trip, for what is not in `trip`."""
     changed: frozenset[str] = frozenset()
     """Settings that were written after the trip: they decide nothing about it."""
 
@@ -153,17 +155,19 @@ def _is_known(rule: CauseRule, code: str, known: KnownValues) -> bool:
     if code in known.changed:
         return False
     if code != rule.parameter:
-        return code in known.trip or code in known.now
+        return code in known.trip or code in known.before or code in known.now
     return _at(rule, known) is not None
 
 
-def _at(rule: CauseRule, known: KnownValues) -> tuple[int, bool] | None:
-    """Return the raw value that decides, and True if it is that of the trip; None if unknown."""
+def _at(rule: CauseRule, known: KnownValues) -> tuple[int, str] | None:
+    """Return the raw value that decides, and its time as text if that is the trip."""
     code = rule.parameter
     if rule.at != "now" and code in known.trip:
-        return known.trip[code], True
+        return known.trip[code], "at the trip"
+    if rule.at != "now" and code in known.before:
+        return known.before[code], "before the trip"
     if rule.at != "trip" and code in known.now:
-        return known.now[code], False
+        return known.now[code], ""
     return None
 
 
@@ -177,20 +181,20 @@ def _evidence(profile: Profile, rule: CauseRule, known: KnownValues) -> Evidence
     parameter = profile.get(rule.parameter)
     if parameter is None or known.changed.intersection(rule.codes):
         return None
-    raws = {**known.now, **known.trip}
+    raws = {**known.now, **known.before, **known.trip}
     found = _at(rule, known)
     if found is None or not rule.has_condition or not all(when.holds(raws) for when in rule.when):
         return None
-    raw, at_trip = found
+    raw, when = found
     value = shown(profile, parameter, raw, raws)
     if not (_raw_fits(rule, raw) and _value_fits(profile, rule, parameter, value, raws)):
         return None
     measured = is_measured(profile, parameter)
-    basis: Basis = "trip" if at_trip else "now" if measured else "setting"
+    basis: Basis = "trip" if when else "now" if measured else "setting"
     text = _text(profile, rule, parameter, value, raws)
-    return Evidence(
-        rule.parameter, f"{text} at the trip" if at_trip and measured else text, basis, rule
-    )
+    if when and measured:
+        text = f"{text} {when}"
+    return Evidence(rule.parameter, text, basis, rule)
 
 
 def _raw_fits(rule: CauseRule, raw: int) -> bool:

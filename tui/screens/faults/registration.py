@@ -22,8 +22,8 @@ def create_faults(console: DriveConsole) -> Screen[None]:
 REGISTERED = (
     Registration(
         title="Faults",
-        about="the present fault with its causes and remedies, the history,"
-        " the seconds before a trip",
+        about="the present fault with its causes, likeliest first, values at the trip and now,"
+        " the history",
         digit="5",
         narrow="Flt",
         create=create_faults,

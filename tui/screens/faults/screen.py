@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
 
@@ -13,7 +15,9 @@ from tui.drive.fault_reset import reset_codes
 from tui.drive.hints import alarms_on, codes_to_read
 from tui.drive.profile.schema import FaultCode
 from tui.session.console import DriveConsole
+from tui.session.journal_reading import entries_of, time_of
 from tui.session.monitor.fault_record import FaultRecord, Recorder, record_name, record_text
+from tui.session.monitor.watched import SeenTrip, Watched, last_trip
 from tui.session.paths import state_folder
 from tui.session.shown import Shown
 from tui.widgets.drawing import rule
@@ -38,6 +42,8 @@ OLD = 3 * READ_AGAIN
 BESIDE = 36
 """Least terminal rows to show the seconds before the trip below the doctor."""
 DOCTOR_ROWS = 24
+SAME_TRIP = 5.0
+"""Seconds between a trip in the journal and in the trend that are the same one."""
 
 
 class FaultsScreen(OrderKeys):
@@ -54,10 +60,14 @@ class FaultsScreen(OrderKeys):
         self.session = console.session
         self._readings: dict[str, Shown] = {}
         self._shown: FaultRecord | None = None
-        self._chosen: FaultCode | None = None
-        """Fault selected in the history; None for the present or last fault."""
+        self._chosen: tuple[int, FaultCode] | None = None
+        """Place and fault selected in the history; None for the present or last fault."""
         self._unread = True
-        self._at = 0
+        self._at: int | None = None
+        """Row of the cursor; None until a person has moved it."""
+        self._last: SeenTrip | None = None
+        """Last trip in the journal."""
+        self._journal_read = False
         self._offset = 0
         self._before = False
         """True if the seconds before the trip are shown instead of the doctor."""
@@ -77,6 +87,7 @@ class FaultsScreen(OrderKeys):
         self._shown = self._recorder.latest
         self._read_again()
         self.set_interval(READ_AGAIN, self._read_again)
+        self.run_worker(self._read_journal(), group="journal")
 
     def _see(self) -> None:
         self._recorder.acknowledge()
@@ -88,6 +99,19 @@ class FaultsScreen(OrderKeys):
             # pass the method: a coroutine that is replaced before it starts causes a warning
             self.run_worker(self._read, exclusive=True, group="faults")  # type: ignore[arg-type]
 
+    async def _read_journal(self) -> None:
+        """Find the last trip in the journal, away from the loop: it may wait for the disk."""
+        session = self.session
+        try:
+            entries = await asyncio.to_thread(
+                entries_of, self.console.journal, session.line_text, session.device
+            )
+        except OSError as error:
+            self.app.notify(f"The journal could not be read: {error}", severity="warning")
+            return
+        self._last, self._journal_read = last_trip(entries), True
+        self.look()
+
     async def _read(self) -> None:
         faults = self.session.profile.data.faults
         view = self.doctor()
@@ -96,6 +120,8 @@ class FaultsScreen(OrderKeys):
             codes = codes_to_read(self.session.profile, view.hint)
         if view.present:
             codes += reset_codes(self.session.profile)
+        if (place := view.stored_place) is not None and place < len(faults.stored):
+            codes += faults.stored[place]
         if self._unread:
             codes += [*faults.history, *(code for stored in faults.stored for code in stored)]
         if not codes:
@@ -123,29 +149,72 @@ class FaultsScreen(OrderKeys):
         alarms = self._alarms()
         if alarms and not present:
             fault = None  # a present alarm takes precedence over a past trip
+        place = None
         if self._chosen is not None:
-            present = present and fault is not None and fault.raw == self._chosen.raw
-            fault = self._chosen
+            place, chosen = self._chosen
+            present = present and place == 0 and fault is not None and fault.raw == chosen.raw
+            fault = chosen
         now = self.app.clock.monotonic()
-        if record is not None and (record.fault != fault or not (fault or present)):
+        if record is not None and (record.fault != fault or not (fault or present) or place):
             record = None
         active = self.app.fleet.alarms.active if self.app.fleet is not None else ()
         ours = (
             present_fault for present_fault in active if present_fault.device == self.session.device
         )
-        return DoctorView(
+        since = next(ours, None) if present else None
+        tripped = record.wall if record is not None else since.wall if since is not None else None
+        view = DoctorView(
             profile=self.session.profile,
             fault=fault,
             present=present,
             record=record,
             now=now,
-            since=next(ours, None) if present else None,
-            readings={code: reading.aged(now, OLD) for code, reading in self._readings.items()},
-            at=self._at,
+            since=since,
+            readings=self._read_since(now),
+            cursor=self._at,
             unread=self._unread,
             raws=self.session.image.raws,
             alarms=alarms,
+            monitored=self._monitored(now),
+            place=place,
+            changed=self._changed_since(tripped),
+            wall=self.app.clock.wall(),
+            armed=self.session.arming.armed,
+            barred=self.session.arming.hindrance,
         )
+        return replace(view, watched=self._watched()) if view.is_quiet else view
+
+    def _read_since(self, now: float) -> dict[str, Shown]:
+        """Return what was read; nothing from before a trip that is not drawn yet."""
+        if self._recorder.latest is not self._shown:
+            return {}
+        return {code: reading.aged(now, OLD) for code, reading in self._readings.items()}
+
+    def _monitored(self, now: float) -> dict[str, Shown]:
+        latest = self.console.monitor.latest
+        readings = latest.readings if latest is not None else {}
+        return {code: reading.aged(now, OLD) for code, reading in readings.items()}
+
+    def _changed_since(self, wall: float | None) -> frozenset[str]:
+        """Return the settings that this program wrote after a time in seconds since 1970."""
+        if wall is None:
+            return frozenset()
+        mine = (self.session.line_text, self.session.device)
+        return frozenset(
+            entry.code
+            for entry in self.console.journal.recent
+            if (entry.line, entry.device) == mine
+            and (when := time_of(entry)) is not None
+            and when.timestamp() > wall
+        )
+
+    def _watched(self) -> Watched:
+        clock, points = self.app.clock, self.console.monitor.trend
+        marks = [clock.wall_of(point.time) for point in points if point.mark == "trip"]
+        last = self._last
+        if marks and (last is None or last.wall < marks[-1] - SAME_TRIP):
+            last = SeenTrip(marks[-1], "", tripped=True)
+        return Watched(self._recorder.since, points, last, self._journal_read)
 
     def _alarms(self) -> list[tuple[str, int, str]]:
         """Return the active alarms in the monitor's values, as word, bit and name."""
@@ -161,15 +230,18 @@ class FaultsScreen(OrderKeys):
         record = self._recorder.latest
         if record is not self._shown:
             self._shown, self._offset, self._unread, self._chosen = record, 0, True, None
-            self._at = 0
+            self._at = None
+            # what the drive had stored belongs to an earlier trip
+            self._readings = {}
             self._read_again()
         self._see()
         rows = self.size.height - 4
         doctor, below = rows, 0
         if self._before:
             doctor, below = 0, rows
-        elif self.size.height >= BESIDE:
-            doctor, below = DOCTOR_ROWS, rows - DOCTOR_ROWS
+        elif self.size.height >= BESIDE and self._shown is not None:
+            doctor = max(DOCTOR_ROWS, rows * 3 // 5)
+            below = rows - doctor
         self.query_one("#doctor", Lines).display = doctor > 0
         self.query_one("#record", Lines).display = below > 0
         lines = doctor_lines(self.doctor(), width, doctor) if doctor else []
@@ -190,29 +262,31 @@ class FaultsScreen(OrderKeys):
     def _stored(self) -> list[str]:
         """Return the codes of the values that the drive stores for the fault under the cursor."""
         stored = self.session.profile.data.faults.stored
-        at = max(0, self._at - len(self.doctor().look_at))
+        view = self.doctor()
+        at = max(0, view.at - len(view.rows))
         return stored[at] if at < len(stored) else []
 
     def action_move(self, rows: int) -> None:
         """Move the cursor by `rows` through the parameters to check and the history."""
         view = self.doctor()
-        most = len(view.look_at) + len(view.history) - 1
-        self._at = max(0, min(most, self._at + rows))
+        most = len(view.rows) + len(view.history) - 1
+        self._at = max(0, min(most, view.at + rows))
         self.look()
 
     async def action_open(self) -> None:
         """Open the parameter under the cursor in the editor, or show that past fault."""
         view = self.doctor()
-        if self._at < len(view.look_at):
-            await self.app.open_parameter(view.look_at[self._at].code)
+        if view.at < len(view.rows):
+            await self.app.open_parameter(view.rows[view.at].code)
             return
-        code = view.history[self._at - len(view.look_at)] if view.history else ""
+        place = view.at - len(view.rows)
+        code = view.history[place] if place < len(view.history) else ""
         reading = self._readings.get(code)
         known = self.session.profile.fault(reading.raw or 0) if reading else None
         if known is None or known.raw == self.session.profile.data.faults.none:
             self.app.tell("No fault is recorded here.")
             return
-        self._chosen, self._at = known, 0
+        self._chosen, self._at = (place, known), None
         self._read_again()
         self.look()
 
@@ -224,7 +298,7 @@ class FaultsScreen(OrderKeys):
     def action_leave(self) -> None:
         """Return from a past fault or the record to the present fault, then to Monitor."""
         if self._chosen is not None or self._before:
-            self._chosen, self._before, self._at = None, False, 0
+            self._chosen, self._before, self._at = None, False, None
             self.look()
         else:
             self.app.pop_screen()
@@ -263,7 +337,8 @@ class FaultsScreen(OrderKeys):
         values = {code: stored_text(reading) for code, reading in self._readings.items()}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(record_text(self.session, record, rows, values), encoding="utf-8")
+            text = record_text(self.session, record, rows, values, self.doctor().known)
+            path.write_text(text, encoding="utf-8")
         except OSError as error:
             self.app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
         else:

@@ -9,6 +9,7 @@ from rich.text import Text
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
+from tui.drive.sentences import counted
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment
@@ -74,8 +75,11 @@ def record_lines(record: FaultRecord | None, width: int, height: int, offset: in
             rule("Before the trip", width),
             Text(" No trip since monitoring of this drive began.", FAINT),
         ]
-    title = (
-        f"Before the trip: {len(record.moments)} cycles, {len(record.writes)} writes by Drive Panel"
+    title = counted(
+        len(record.writes),
+        "Before the trip: {cycles} cycles, 1 write by Drive Panel",
+        "Before the trip: {cycles} cycles, {count} writes by Drive Panel",
+        cycles=len(record.moments),
     )
     head = Text(f" {'s':>{FAULT_TIME_WIDTH - 1}}", FAINT, no_wrap=True)
     for heading in record.headings[: _columns(width)]:

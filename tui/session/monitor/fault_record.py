@@ -78,6 +78,8 @@ class Recorder:
     """Last trip that occurred while the drive was monitored."""
     seen: bool = True
     """True if a person has viewed it."""
+    since: float | None = None
+    """When this program first read the drive (monotonic); None before."""
     _moments: deque[tuple[Snapshot, float]] = field(default_factory=deque)
     _kind: str = "unknown"
 
@@ -85,6 +87,8 @@ class Recorder:
         """Keep a snapshot; the first one of a fault creates the record. In the line's thread."""
         if snapshot.error or snapshot.state.kind == "unknown":
             return
+        if self.since is None:
+            self.since = snapshot.time
         self._moments.append((snapshot, snapshot.time))
         while self._moments[0][1] < snapshot.time - SECONDS_KEPT:
             self._moments.popleft()
@@ -168,7 +172,7 @@ def record_text(
     ]
     lines += [f"- Cause: {fault.cause}"] if fault and fault.cause else []
     lines += [f"- Remedy: {fault.remedy}"] if fault and fault.remedy else []
-    lines += _pointed_at(session, fault, values or {}, known or KnownValues(trip=record.raws))
+    lines += _pointed_at(session, fault, values or {}, known or KnownValues(before=record.raws))
     if stored:
         lines += ["", "## Stored by the drive", "", "| code | name | value |", "|---|---|---|"]
         lines += [f"| {code} | {name} | {value} |" for code, name, value in stored]
