@@ -32,6 +32,7 @@ from .load import unread_limit
 from .look import Look, last_that_brought
 from .monitor import Monitor
 from .timeout import TimeoutWarning, has_begun, read_timeout
+from .trend import readout_parameter
 
 log = logging.getLogger(__name__)
 
@@ -256,6 +257,7 @@ class LineWatch:
                 state, error, kept.session.clock.monotonic(), timeout, readings, before, contact
             )
             self._looks = {**self._looks, device: look}
+            kept.monitor.add_to_trend(look)
         return self.glance_period if kept.learned is not None else GLANCE / 10
 
     @property
@@ -281,7 +283,7 @@ class LineWatch:
 
 def _glance_codes(profile: Profile) -> list[str]:
     """Return the codes of the values that a list of drives shows with the state."""
-    found = (profile.quantity(quantity) for quantity in GLANCE_QUANTITIES)
+    found = (readout_parameter(profile, quantity) for quantity in GLANCE_QUANTITIES)
     return [parameter.code for parameter in found if parameter is not None]
 
 

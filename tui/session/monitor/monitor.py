@@ -27,7 +27,7 @@ from ..shown import Quality
 from .rates import SLOW_FACTOR, Rates, bad_readings, rates_of
 from .snapshot import Snapshot, stale_after
 from .steady_cycles import SteadyCycles, SteadyPlan
-from .trend import Trend, TrendNotes, TrendPoint
+from .trend import Trend, TrendCycle, TrendNotes, TrendPoint
 
 log = logging.getLogger(__name__)
 
@@ -92,6 +92,16 @@ class Monitor:
     def trend(self) -> tuple[TrendPoint, ...]:
         """The trend of the last minutes, oldest first."""
         return self._trend.points
+
+    @property
+    def last_point(self) -> TrendPoint | None:
+        """The newest point of the trend; None without any."""
+        return self._trend.last
+
+    def add_to_trend(self, cycle: TrendCycle) -> None:
+        """Add a cycle, or a check between the cycles, to the trend. In the line's thread."""
+        self._notes.ask()
+        self._notes.add(self._trend.add(cycle, self.session.edits_written))
 
     @property
     def running(self) -> bool:
@@ -308,7 +318,7 @@ class Monitor:
         if snapshot.state.kind in RESET_NEAR:
             self.reader.distrust()
         self._latest = snapshot
-        self._notes.add(self._trend.add(snapshot, self.session.edits_written))
+        self.add_to_trend(snapshot)
         self._hand_out(snapshot)
 
 

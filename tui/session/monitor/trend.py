@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, Protocol, get_args
 
 import msgspec
 
@@ -18,7 +18,7 @@ from tui.drive.profile.schema import Parameter, Quantity
 
 from ..drive_state import DriveState, with_direction
 from ..reading import Reading, with_text
-from .snapshot import Snapshot
+from ..shown import Shown
 
 TREND_SECONDS = 600.0
 TREND_QUANTITIES: tuple[Quantity, ...] = (
@@ -43,6 +43,26 @@ class TrendPoint:
     values: tuple[float | None, ...]
     mark: str = ""
     """A TrendMark, or empty; a program of another version may leave others."""
+
+
+class TrendCycle(Protocol):
+    """One read of a drive's values: a cycle of its monitor, or a check of the line watch."""
+
+    @property
+    def time(self) -> float:
+        """End of the read (monotonic)."""
+
+    @property
+    def error(self) -> str:
+        """Why it failed; empty if it succeeded."""
+
+    @property
+    def readings(self) -> Mapping[str, Shown]:
+        """Its values."""
+
+    @property
+    def state(self) -> DriveState | None:
+        """State of the drive; None if the read failed."""
 
 
 TrendMark = Literal["lost", "trip", "stop", "start", "reset", "write", "reference"]
@@ -79,6 +99,11 @@ class Trend:
         return tuple(self._points)
 
     @property
+    def last(self) -> TrendPoint | None:
+        """The newest point; None without any."""
+        return self._points[-1] if self._points else None
+
+    @property
     def kind(self) -> str:
         """Profile, codes and units: points of trends of the same kind can be joined."""
         parts = [f"trend {self._profile.id}"]
@@ -94,22 +119,23 @@ class Trend:
         times = sorted(point for point in points if point >= last - TREND_SECONDS)
         self._points = deque(points[time] for time in times)
 
-    def add(self, snapshot: Snapshot, edits: int = 0) -> TrendPoint:
+    def add(self, cycle: TrendCycle, edits: int = 0) -> TrendPoint:
         """Add a cycle; a failed cycle leaves a gap, never a repeated value.
 
         `edits` is the number of settings that this program has written to the drive so far.
         """
-        readings = with_text(snapshot.readings)
+        state = None if cycle.error else cycle.state
+        readings = with_text(cycle.readings)
         values = tuple(
-            trend_value(readings[code], snapshot.state)
-            if code and code in readings and not snapshot.error
+            trend_value(readings[code], state)
+            if code and code in readings and state is not None
             else None
             for code in self._codes
         )
-        mark = self._marker.mark(snapshot, values[REFERENCE_PLACE], edits)
-        point = TrendPoint(snapshot.time, values, mark)
+        mark = self._marker.mark(cycle, values[REFERENCE_PLACE], edits)
+        point = TrendPoint(cycle.time, values, mark)
         self._points.append(point)
-        while self._points[0].time < snapshot.time - TREND_SECONDS:
+        while self._points[0].time < cycle.time - TREND_SECONDS:
             self._points.popleft()
         return point
 
@@ -128,26 +154,27 @@ class TrendMarker:
         self._references: tuple[float | None, float | None] = (None, None)
         self._edits = 0
 
-    def mark(self, snapshot: Snapshot, reference: float | None, edits: int) -> str:
+    def mark(self, cycle: TrendCycle, reference: float | None, edits: int) -> str:
         """Return the most urgent event since the last cycle; empty without one."""
-        found = set(self._events(snapshot, reference, edits))
-        self._failed = bool(snapshot.error)
+        state = None if cycle.error else cycle.state
+        found = set(self._events(state, reference, edits))
+        self._failed = state is None
         self._references = (self._references[1], reference)
-        if not self._failed:
-            kind = snapshot.state.kind
-            self._kind, self._edits = "" if kind == "unknown" else kind, edits
+        if state is not None:
+            self._kind, self._edits = "" if state.kind == "unknown" else state.kind, edits
         return next((mark for mark in TREND_MARKS if mark in found), "")
 
     def _events(
-        self, snapshot: Snapshot, reference: float | None, edits: int
+        self, state: DriveState | None, reference: float | None, edits: int
     ) -> Iterator[TrendMark]:
-        if snapshot.error:
+        """Yield the events of a cycle; `state` is None if it failed."""
+        if state is None:
             if not self._failed:
                 yield "lost"
             return
         if edits > self._edits:
             yield "write"
-        before, kind = self._kind, snapshot.state.kind
+        before, kind = self._kind, state.kind
         if before and kind not in (before, "unknown"):
             found = _change(before, kind)
             # events of a drive that was not read are not known, except a fault that it now has
