@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Sequence
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from rich.style import Style
 from rich.text import Text
@@ -16,6 +18,9 @@ from tui.session.connect.named_lines import LineSettings, line_named
 from tui.session.connect.open_line import check_line
 from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT, FAULT, PLAIN, RUNNING, STRONG
+
+if TYPE_CHECKING:
+    from tui.bus.link import SerialLink
 
 _LASTING = re.compile(r"(?:serial:)?/dev/serial/by-(?:id|path)/(?:usb-)?")
 COUNTED = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
@@ -50,6 +55,15 @@ def simulated_lines() -> tuple[tuple[str, str], ...]:
     )
 
 
+class PortSettings(NamedTuple):
+    """Settings with which a serial port was used last."""
+
+    baud: int
+    format: str
+    timeout: float | None = None
+    """Longest wait for a reply in seconds, if a person has set it."""
+
+
 class LineChoice(NamedTuple):
     """Line to open; `path` is set for a serial port, which gets its settings from the form."""
 
@@ -60,6 +74,8 @@ class LineChoice(NamedTuple):
     """Name in the settings file."""
     device: int | None = None
     """Address of the drive that the name includes; None if it names only a line."""
+    settings: PortSettings | None = None
+    """Last settings of a serial port; None if it was not used before."""
 
 
 ListMark = Literal["", "open", "shown", "fault"]
@@ -83,15 +99,54 @@ class Group(NamedTuple):
 def groups(
     ports: list[tuple[str, str]], recent: list[str], settings: LineSettings | None = None
 ) -> list[Group]:
-    """Return the groups in display order; `ports` are pairs of path and description."""
-    serial = tuple(LineChoice(path, description, path) for path, description in ports)
-    lately = tuple(LineChoice(text, "") for text in recent if not _offered_simulated(text))
+    """Return the groups in display order; `ports` are pairs of path and description.
+
+    `recent` are lines used lately, the last one first. A listed port takes its last settings from
+    them: it has one entry, whatever name it was used by.
+    """
+    used = _port_settings(recent) if ports else {}
+    serial = tuple(
+        LineChoice(path, description, path, settings=used.get(os.path.realpath(path)))
+        for path, description in ports
+    )
+    listed = {os.path.realpath(path) for path, _ in ports}
+    lately = tuple(
+        LineChoice(text, "")
+        for text in recent
+        if not _offered_simulated(text) and port_of(text) not in listed
+    )
     return [
         *_named(settings),
         Group("Serial ports", serial, "none found"),
         Group("Recent", lately, "none yet (n: type one)"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in simulated_lines()[:2])),
     ]
+
+
+def _port_settings(recent: Sequence[str]) -> dict[str, PortSettings]:
+    """Return the last settings of each serial port by its real path."""
+    found: dict[str, PortSettings] = {}
+    for text in recent:
+        if (link := _serial_link(text)) is not None:
+            settings = PortSettings(link.baud, link.format, link.timeout)
+            found.setdefault(os.path.realpath(link.path), settings)
+    return found
+
+
+def port_of(text: str) -> str:
+    """Return the real path of the port of a serial line; empty for another line."""
+    link = _serial_link(text)
+    return os.path.realpath(link.path) if link is not None else ""
+
+
+def _serial_link(text: str) -> SerialLink | None:
+    from tui.bus.link import SerialLink, parse_link
+
+    try:
+        link = parse_link(text)
+    except LinkSyntaxError:
+        return None  # a simulated line
+    return link if isinstance(link, SerialLink) else None
 
 
 def _named(settings: LineSettings | None) -> list[Group]:

@@ -21,6 +21,8 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import SURFACE, TEXT
 from tui.widgets.plain import Plain
 
+from .choices import LineChoice, PortSettings
+
 FIELD_NAME_CELLS = 11
 FORMAT_CELLS = 4
 
@@ -71,6 +73,8 @@ class LineForm(Vertical):
 
     typed = False
     """True if the user has edited the addresses since the last line was opened."""
+    _offered: tuple[str, PortSettings | None] | None = None
+    """Port whose settings were shown last, with these."""
     _there = False
     """True once the fields are mounted."""
 
@@ -123,11 +127,14 @@ class LineForm(Vertical):
         if self._requested is not None:
             self.screen.set_focus(self._requested)
 
-    def line_at(self, path: str) -> str:
-        """Return the LINE of a serial port with the settings in the form."""
-        return (
-            f"serial:{path},{self._typed('baud') or BAUD},{self._typed('format').upper() or FORMAT}"
-        )
+    def line_at(self, path: str, timeout: float | None = None) -> str:
+        """Return the LINE of a serial port with the settings in the form.
+
+        `timeout` is the longest wait for a reply in seconds; None for the default.
+        """
+        baud, format = self._typed("baud") or BAUD, self._typed("format").upper() or FORMAT
+        longest = "" if timeout is None else f",timeout={timeout:g}"
+        return f"serial:{path},{baud},{format}{longest}"
 
     @property
     def addresses_text(self) -> str:
@@ -170,10 +177,18 @@ class LineForm(Vertical):
         if self._there:
             self.screen.set_focus(self._requested)
 
-    def offer_settings(self, port: bool) -> None:
-        """Enable baud and format for a serial port; disable them for other lines."""
+    def offer_settings(self, choice: LineChoice | None) -> None:
+        """Enable baud and format for a serial port, and show those with which it was used last.
+
+        They are disabled for other lines. What was typed for a port stays while it is chosen.
+        """
+        port = (choice.path, choice.settings) if choice is not None and choice.path else None
         for name in ("baud", "format"):
-            self._fields[name].disabled = not port
+            self._fields[name].disabled = port is None
+        if port is not None and port != self._offered:
+            self._offered = port
+            used = port[1]
+            self.show_settings(used.baud if used else int(BAUD), used.format if used else FORMAT)
         self._draw()
 
     def show_settings(self, baud: int, format: str) -> None:

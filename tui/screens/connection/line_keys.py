@@ -37,7 +37,9 @@ class LineKeys(Scanning):
 
     def line_of(self, choice: LineChoice) -> str:
         """Return the LINE of a choice; a serial port gets the settings in the form."""
-        return self.form.line_at(choice.path) if choice.path else choice.text
+        if not choice.path:
+            return choice.text
+        return self.form.line_at(choice.path, choice.settings.timeout if choice.settings else None)
 
     def action_type_line(self) -> None:
         """Ask for a LINE or a name, and open it."""

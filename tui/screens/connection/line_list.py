@@ -14,7 +14,7 @@ from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT
 from tui.widgets.plain import entry
 
-from .choices import Group, LineChoice, ListMark, choice_line, groups
+from .choices import Group, LineChoice, ListMark, choice_line, groups, port_of
 
 
 class LineList(OptionList):
@@ -46,10 +46,11 @@ class LineList(OptionList):
         from tui.session.connect.open_line import serial_ports
 
         lately = recent_lines()
-        named = [self._named] if self._named and self._named not in lately else []
+        if self._named:
+            lately = [self._named, *(text for text in lately if text != self._named)]
         settings = line_settings()
         known = {line.line for line in settings.lines.values()}
-        recent = [text for text in [*named, *lately] if text not in known]
+        recent = [text for text in lately if text not in known]
         self._groups = groups(serial_ports(), recent, settings)
 
     def choice(self, id: str | None) -> LineChoice | None:
@@ -69,7 +70,12 @@ class LineList(OptionList):
         self._named = text = remembered_text(text)
         self.look_for_lines()
         self._fill()
-        fits = [id for id, choice in self._choices.items() if choice.text == text]
+        port = port_of(text)
+        fits = [
+            id
+            for id, choice in self._choices.items()
+            if choice.text == text or (port and choice.path and port == port_of(choice.path))
+        ]
         if fits:
             self.highlighted = self.get_option_index(fits[0])
 

@@ -87,8 +87,7 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
         """Show details of the chosen drive, or enable the serial settings for a chosen port."""
         if event.option_list is self.lines:
-            choice = self.lines.choice(event.option.id)
-            self.form.offer_settings(bool(choice and choice.path))
+            self.form.offer_settings(self.lines.choice(event.option.id))
         else:
             self.show_about()
 

@@ -142,7 +142,7 @@ class LineView(PanelScreen):
         for fault in line_settings().faults:
             self.app.events.add(ALARM_KIND, fault)
         self.lines.fill(self.app.line_text, self.app.open_texts)
-        self.form.offer_settings(bool(self.lines.chosen and self.lines.chosen.path))
+        self.form.offer_settings(self.lines.chosen)
         self._looking = [self.set_interval(SELDOM if self.app.low_bandwidth else STATES, self.look)]
 
     def on_resize(self, event: Resize) -> None:
