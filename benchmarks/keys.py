@@ -148,7 +148,7 @@ def main() -> None:
         panel = terminal.client()
         try:
             # version 0.1 had its cursor on another line until the search had ended
-            terminal.wait_for("addresses answered" if arguments.before else "1 found")
+            terminal.wait_for("addresses answered" if arguments.before else "of 10 addresses")
             time.sleep(1.0)
             for task in TASKS:
                 steps = task.before if arguments.before else task.now

@@ -23,6 +23,7 @@ from tui.terminal.last_words import LastWords
 from tui.widgets.drawing import short
 from tui.widgets.palette import THEME
 
+from .screens.drive_keys import DriveKeys
 from .screens.key_dispatcher import KeyDispatcher
 from .screens.last_stops import LastStops
 from .screens.leaving import Leaving
@@ -40,7 +41,14 @@ LONGEST_CAUSE = 120
 
 
 class DrivePanelApp(
-    LastWords, KeyDispatcher, StatusRefresher, LineOwner, LineCheck, ParameterPlaces, Leaving
+    LastWords,
+    KeyDispatcher,
+    StatusRefresher,
+    LineOwner,
+    LineCheck,
+    ParameterPlaces,
+    DriveKeys,
+    Leaving,
 ):
     """The panel on one line at a time.
 

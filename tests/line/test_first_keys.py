@@ -34,5 +34,5 @@ def test_unknown_key_sequence_is_reported(terminal_with: Start) -> None:
 def test_f12_is_not_tested_with_an_open_line(terminal_with: Start) -> None:
     """It would stop motors that run."""
     terminal = terminal_with([*PANEL, "sim:atv71@2"])
-    terminal.wait_for("ATV71", "1 found")
+    terminal.wait_for("ATV71", "1 drive: ")
     assert "press F12" not in terminal.text()

@@ -120,7 +120,7 @@ async def test_single_drive_is_identified_before_profiles_are_read(
     (result,) = await searched(search, line, texts)
     assert result.identity is not None
     assert result.identity.reference == "ATV71HU15M3"
-    assert (search.ended, texts) == ("done", ["1 of 1, 1 found"])
+    assert (search.ended, texts) == ("done", ["1 of 1 address, 1 found"])
     # nothing else was requested
     assert line.requested == []
 
@@ -143,7 +143,11 @@ async def test_drive_missed_once_is_probed_again_with_a_longer_wait() -> None:
     search = Search(range(1, 6), line.no_time)
     assert devices(await searched(search, line, texts)) == [1, 4, 3]
     assert (line.background(), line.patiently()) == ([1, 2, 3, 4, 5], [2, 3, 5])
-    assert texts == ["1 of 5, 1 found", "4 of 5, 2 found", "2 of 3 again"]
+    assert texts == [
+        "1 of 5 addresses, 1 found",
+        "4 of 5 addresses, 2 found",
+        "2 of 3 addresses again",
+    ]
     assert (search.text, set(search.answered)) == ("done, 3 found", {1, 3, 4})
 
 

@@ -26,6 +26,7 @@ from tui.screens.choosing import Palette
 from tui.screens.command.command_keys import OptionsScreen
 from tui.screens.command.teaching import PickWord, fault_of_look
 from tui.screens.connection.choices import fault_of_line
+from tui.screens.dialogs.address import AddressField
 from tui.screens.dialogs.ask import Ask, fault_of_new
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.leave import Leave
@@ -76,6 +77,7 @@ def _parameter(console: DriveConsole, code: str) -> Any:
 
 
 DIALOGS: dict[str, Make] = {
+    "AddressField": lambda *_: AddressField({2: "2 MACHINE 4"}),
     "Ask": lambda *_: Ask("Save to", lambda _: "wrong"),
     "Ask for a number": lambda *_: Ask("Rated current", lambda _: "wrong", number=True),
     "Confirm": lambda app, console: Confirm(

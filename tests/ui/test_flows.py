@@ -150,7 +150,7 @@ async def test_drive_with_a_timeout_is_still_polled() -> None:
         await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
         await pilot.pause(1.0)
         state = app.connection.drives.get_option_at_index(0).prompt
-        assert "▶ forward" in str(state)
+        assert "▶ FORWARD" in str(state)
 
 
 async def test_frames_help_and_palette_open_and_close() -> None:

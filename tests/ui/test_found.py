@@ -16,10 +16,10 @@ from tui.screens.connection.state import QUIET
 from tui.screens.connection.wall import (
     WALL_SIGNS,
     WallRow,
+    aligned,
     column_heads,
     columns_for,
     heading,
-    in_order,
     load_bar,
     wall_line,
 )
@@ -47,44 +47,65 @@ rows = st.builds(
     st.integers(1, 247),
     *[st.text("abcABC123 é漢", max_size=40)] * 2,
     st.sampled_from([*WALL_SIGNS, "ready", "stopped"]),
-    *[st.text("abcABC123 .", max_size=30)] * 4,
+    *[st.text("abcABC123 .", max_size=30)] * 5,
     st.none() | st.floats(0, 3),
     st.none() | st.floats(0, 1e7),
     st.booleans(),
+    st.tuples(*[st.text("abc -:", max_size=40)] * 2),
+    st.text("abc >", max_size=9),
+    st.sampled_from(["", "alarm", "fault"]),
+    st.lists(st.text("⠒ ", max_size=50), max_size=2).map(tuple),
 )
 
 
-@given(st.integers(36, 180), rows, rows)
-def test_columns_of_a_row_never_move(width: int, wall_row: WallRow, other: WallRow) -> None:
-    columns = columns_for(width)
-    lines = [wall_line(row, columns) for row in (wall_row, other)]
-    assert {len(line.plain) for line in lines} == {columns.taken}
+@given(st.integers(36, 220), st.booleans(), rows, rows)
+def test_columns_of_a_row_never_move(
+    width: int, two_rows: bool, wall_row: WallRow, other: WallRow
+) -> None:
+    columns = columns_for(width, two_rows=two_rows)
+    lines = [wall_line(row, columns).split("\n") for row in (wall_row, other)]
+    assert {len(line.plain) for drawn in lines for line in drawn} == {columns.taken}
+    assert {len(drawn) for drawn in lines} == {columns.rows}
     assert columns.taken <= width
-    assert len(column_heads(columns).plain) == columns.taken
+    for scale in (None, 60.0, 1200.0):
+        assert len(column_heads(columns, scale).plain) == columns.taken
 
 
-def test_narrow_row_drops_load_then_name() -> None:
-    kept = [columns_for(width) for width in (180, 86, 70, 53)]
-    assert [(bool(columns.load), bool(columns.name), bool(columns.drive)) for columns in kept] == [
-        (True, True, True),
+def test_narrow_row_drops_model_then_curve_then_name() -> None:
+    kept = [columns_for(width) for width in (119, 79, 51, 36)]
+    assert [(bool(columns.model), bool(columns.curve), bool(columns.name)) for columns in kept] == [
         (True, True, True),
         (False, True, True),
         (False, False, True),
+        (False, False, False),
     ]
 
 
-def test_faults_come_first_in_order_of_occurrence() -> None:
-    assert in_order([1, 3, 9, 17, 20], [17, 3]) == [17, 3, 1, 9, 20]
+def test_two_rows_are_used_only_if_they_fit() -> None:
+    assert [columns_for(width, two_rows=True).rows for width in (119, 79, 60)] == [2, 2, 1]
 
 
-def test_heading_counts_drives_in_fault_lost_and_found() -> None:
+def test_decimal_points_are_below_each_other() -> None:
+    texts = aligned(["46.0", "12.50", "7", "", "1380", "-----"])
+    assert texts == ["46.0 ", "12.50", "7   ", "", "1380   ", "-----   "]
+    points = {f"{text:>9}".find(".") for text in texts[:2]}
+    assert len(points) == 1
+
+
+def test_heading_counts_drives_in_each_state() -> None:
     drives = [
-        WallRow(1, "", kind="fault"),
-        WallRow(2, "", kind="unknown", words="lost"),
-        WallRow(3, ""),
+        WallRow(1, kind="fault"),
+        WallRow(2, kind="unknown", words="NO ANSWER"),
+        WallRow(3, kind="running", words="FORWARD"),
+        WallRow(4, kind="running", words="REVERSE"),
+        WallRow(5, kind="ready", words="STANDBY"),
     ]
-    assert "1 in fault · 1 lost · 3 of 10" in heading("a line", drives, 10, 60).plain
-    assert heading("a line", drives, 10, 60).cell_len == 60
+    scan = ["scan done: 5 of 10 addresses", "5 of 10 addresses"]
+    text = heading("a line", drives, scan, 80).plain
+    assert text.startswith(" 5 drives: 2 running, 1 standby, 1 fault, 1 no answer  ")
+    assert text.endswith("  5 of 10 addresses ")
+    assert heading("a line", drives, scan, 120).plain.endswith(f"  {scan[0]} ")
+    assert heading("a line", drives, [], 30).plain == " 5 drives: 2 running, ...      "[:30]
 
 
 @pytest.mark.parametrize(("share", "filled"), [(None, 0), (0.0, 0), (0.5, 5), (1.0, 10), (1.5, 10)])
@@ -148,12 +169,12 @@ async def test_new_state_moves_nothing_in_a_long_drive_list(
         assert drawn == ["5", "26"], "only what changed is drawn"
         await pilot.pause()
         assert (drives.scroll_offset, drives.highlighted) == (before, 25)
-        assert "■ OHF" in str(drives.get_option("26").prompt)
-        # no key for a while: faults are listed first, the cursor stays on its drive
+        assert "■ FAULT OHF" in str(drives.get_option("26").prompt)
+        # a drive in fault keeps its place, too
         app.clock.monotonic = lambda: fakes.NOW + QUIET  # type: ignore[method-assign]
         screen._typed_at = fakes.NOW
         screen.show_drives()
-        assert [option.id for option in drives.options][:3] == ["5", "26", "1"]
+        assert [option.id for option in drives.options][:3] == ["1", "2", "3"]
         assert drives.chosen == 26
 
 

@@ -22,6 +22,7 @@ from tui.session.connect.search import Search
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
 from tui.session.monitor.look import Look
+from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.paths import remember_line
 
 from . import fakes
@@ -56,8 +57,19 @@ def drive(device: int, looks: dict[int, Look], how: dict[str, int], age: float) 
     identity = replace(fakes.ATV71, device=device, reference=MODELS[device % 3], name=name)
     console = fakes.console_of(None, device=device)
     console.session.image.confirm("INV", 75, fakes.NOW)
+    console.monitor = fakes.StillMonitor(console.session, None, minute_of(device, how, age))
     looks[device] = fakes.look_of(how, age=age)
     return FoundDrive(identity, console)
+
+
+def minute_of(device: int, how: dict[str, int], age: float) -> list[TrendPoint]:
+    """The last minute of a motor that has another frequency since some seconds."""
+    now, change = how["RFR"] / 10, 20.0 + 7 * device % 30
+    before = 0.0 if device % 2 else now * 0.7
+    return [
+        TrendPoint(fakes.NOW - back, (now if back < change else before, None, None))
+        for back in range(60, int(age), -3)
+    ]
 
 
 def wall(count: int, *, line: LineState = fakes.CONNECTED) -> fakes.StillFleet:
@@ -187,6 +199,11 @@ async def lost_drive(app: Any, pilot: Pilot[None]) -> None:
     looks: dict[int, Look] = fleet.line_watch.looks  # type: ignore[assignment]
     for device, age in ((2, 47.0), (4, 5.0)):
         before = replace(looks[device], time=fakes.NOW - age)
+        monitor = fleet.found[device].console.monitor  # type: ignore[union-attr]
+        points = [p for p in monitor.trend if p.time < fakes.NOW - age]
+        monitor._trend = Trend(
+            monitor.profile, [*points, TrendPoint(fakes.NOW - age + 3, (None,) * 3, "lost")]
+        )
         looks[device] = Look(
             None, "Device did not answer.", fakes.NOW - 1, None, {}, before, "silent"
         )
@@ -237,7 +254,15 @@ async def line_lost(app: Any, pilot: Pilot[None]) -> None:
 async def wrong_addresses(app: Any, pilot: Pilot[None]) -> None:
     await show(app, pilot, wall(5), fakes.CONNECTED)
     await pilot.press("c", "1", "-", "enter")
+    await pilot.pause()
+    app.connection.look()  # the list of drives has another width now
     app.draw_frame()
+    await pilot.pause()
+
+
+async def address(app: Any, pilot: Pilot[None]) -> None:
+    await show(app, pilot, wall(5), fakes.CONNECTED)
+    await pilot.press("full_stop", "3")
     await pilot.pause()
 
 
@@ -265,6 +290,7 @@ STATES: dict[str, Callable[[Any, Pilot[None]], Awaitable[None]]] = {
     "poor-line": poor_line,
     "line-lost": line_lost,
     "wrong-addresses": wrong_addresses,
+    "address": address,
     "dialog": dialog,
 }
 USUAL = [
@@ -275,7 +301,7 @@ USUAL = [
 OTHERS = [
     pytest.param(state, size, marks=marks)
     for state in ("no-line", "thirty-one")
-    for size, marks in (((60, 20), ()), ((200, 60), pytest.mark.sweep))
+    for size, marks in (((60, 16), ()), ((200, 60), pytest.mark.sweep))
 ]
 
 

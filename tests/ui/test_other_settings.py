@@ -114,8 +114,8 @@ async def test_possible_drives_are_named_before_first_request() -> None:
             await until(pilot, lambda: "Altivar 21 (F803), and" in shown(app, "message"))
             assert "polled while the line is open" in advice(app)
             assert peer.requests == []
-            await until(pilot, lambda: " left" in shown(app, "search"))
-            assert " s left." in advice(app)
+            await until(pilot, lambda: " s left." in advice(app))
+            assert "of 10 addresses" in shown(app, "search")
 
 
 async def test_drives_are_still_polled_during_the_question() -> None:

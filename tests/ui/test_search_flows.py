@@ -67,9 +67,9 @@ async def test_drive_is_opened_during_the_scan() -> None:
         await until(pilot, lambda: app.connection.drives.option_count == 2)
         assert app.connection.search is search
         assert search.goes_on
-        assert f"Scan {search.requested} of" in shown(app, "search")
+        assert f"scan {search.requested} of" in shown(app, "drives-title")
         await pilot.press("escape")
-        await until(pilot, lambda: "stopped, 2 found" in shown(app, "search"))
+        await until(pilot, lambda: "scan stopped: 2 of " in shown(app, "drives-title"))
         assert not search.goes_on
 
 
@@ -93,7 +93,8 @@ async def test_typed_addresses_are_stored_for_the_line() -> None:
         await pilot.press("1", "4", "enter")
         await until(pilot, lambda: set(app.connection.found) == {1, 14})
         await until(pilot, lambda: app.connection.drives.has_focus)
-        assert "2 of 3" in shown(app, "drives-title"), "those found stay, and count"
+        await until(pilot, lambda: "1 of 2 addresses" in shown(app, "drives-title"))
+        assert "2 drives: " in shown(app, "drives-title"), "those found stay, and count"
         text = app.line_text
         await app.disconnect()
         app.connection.form.offer_addresses("1-10")

@@ -259,7 +259,7 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
         current_unit=values["motor_current"][1] or "A",
         age=age,
         armed=armed if armed is None or math.isfinite(armed) else 99.0,
-        by=_commanding(fleet, session.device) or _commanded_by(state),
+        by=other_commander(fleet, session.device, state),
         family=_family(model, session.profile.id),
     )
 
@@ -284,6 +284,11 @@ def _seen(
     age = max(0.0, now - snapshot.read_at)
     lost = bool(snapshot.error) or snapshot.is_stale(now)
     return snapshot.state, age if lost else None, snapshot.readings
+
+
+def other_commander(fleet: Fleet, device: int, state: DriveState | None) -> str:
+    """Return the commander of a drive if it is not this panel; empty if it is, or is unknown."""
+    return _commanding(fleet, device) or _commanded_by(state)
 
 
 def _commanding(fleet: Fleet, device: int) -> str:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from .app_port import Panel
 from .keys.action import (
     CONNECTION,
-    MESSAGES,
     MONITOR,
     WIRING,
 )
@@ -88,25 +87,6 @@ class Places(Panel):
             return None
         shown: AwaitMount = self.push_screen(registered.create(console))
         return shown
-
-    def action_step_drive(self, step: int) -> None:
-        """Show the same screen for the next or previous drive found on the line."""
-        consoles = self.fleet.consoles if self.fleet else []
-        if self.chosen not in consoles:
-            self.tell("No drive is open. Select a drive on Line and press Enter.")
-            return
-        if len(consoles) < 2:
-            self.tell("Only one drive was found on the line.")
-            return
-        place = self.place
-        wanted = consoles[(consoles.index(self.chosen) + step) % len(consoles)]
-        if place == CONNECTION:
-            self._choose(wanted)
-            self._ask_screen("draw_stop_keys")
-            return
-        self.show_monitor(wanted)
-        if place not in (MONITOR, MESSAGES):
-            self.show_place(place, wanted)
 
     def action_messages(self) -> None:
         """Show all messages."""

@@ -74,6 +74,11 @@ BLOCKS = CurveSigns(1, 2, " ▄▀█", " ▄▀█", "·", "│")
 ASCII_SIGNS = CurveSigns(1, 3, ' _-|"|||', " .=:':::", " ", "!")
 
 
+def curve_signs(*, plain: bool, braille: bool) -> CurveSigns:
+    """Return the characters for a terminal; `plain` means ASCII only."""
+    return ASCII_SIGNS if plain else BRAILLE if braille else BLOCKS
+
+
 @dataclass(frozen=True, slots=True)
 class Curve:
     """Values of one quantity and how they are drawn."""
@@ -259,6 +264,14 @@ def curve_rows(
             cells[cursor] = _under_cursor(cells[cursor], is_lit=cursor in found)
         rows.append(_row(tuple(cells)))
     return rows
+
+
+def curve_texts(curve: Curve, plot: Plot, reach: float) -> list[str]:
+    """Return the rows of a plot with one curve and nothing else, as characters."""
+    rows = [[" "] * plot.columns for _ in range(plot.rows)]
+    for row, column, character in _cells(curve, plot, reach):
+        rows[row][column] = character
+    return ["".join(cells) for cells in rows]
 
 
 CurveCell = tuple[str, Style]

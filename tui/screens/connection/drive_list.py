@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Self
 
+from rich.style import Style
 from rich.text import Text
+from textual.geometry import Region, Size
+from textual.reactive import reactive
+from textual.strip import Strip
+from textual.visual import VisualType
 from textual.widgets import OptionList
 
-from tui.widgets.plain import entry
+from tui.widgets.lines import strip_of
+from tui.widgets.plain import entry, signs
+
+CURSOR_SIGN = "▸"
+"""Replaces the first cell of the drive under the cursor, also on a terminal without colors."""
+UNDER_CURSOR = "option-list--option-highlighted"
 
 
 class DriveList(OptionList):
-    """Drives that answered, one per row; a changed state redraws only its row.
+    """Drives that answered, each in the same number of rows.
 
-    The cursor stays on its drive when rows are inserted above it.
+    A changed state or a moved cursor draws only the rows of the drives that it concerns. The
+    cursor stays on its drive when rows are inserted above it.
     """
+
+    highlighted: reactive[int | None] = reactive(None, repaint=False)
 
     def update_node_styles(self, animate: bool = True) -> None:
         """Skip styling until the list is attached; Textual then styles it as a whole."""
@@ -22,6 +36,11 @@ class DriveList(OptionList):
             super().update_node_styles(animate)
 
     def __init__(self, *, id: str) -> None:
+        self._each = 1
+        """Rows of each drive."""
+        self._strips: dict[tuple[int, int, bool], Strip] = {}
+        """Drawn rows by index, row of the drive, and True under the cursor."""
+        self._under: dict[bool, Style] = {}
         super().__init__(id=id, compact=True)
         self._drawn: dict[int, Text] = {}
 
@@ -46,12 +65,16 @@ class DriveList(OptionList):
             stay = [device for device in self._drawn if device in lines]
             wanted = [*stay, *(device for device in wanted if device not in self._drawn)]
         before, self._drawn = self._drawn, {device: lines[device] for device in wanted}
-        if wanted == list(before):
+        each = max((text.plain.count("\n") + 1 for text in lines.values()), default=1)
+        if wanted == list(before) and each == self._each:
             for device in wanted:
-                if lines[device] != before[device] or lines[device].spans != before[device].spans:
+                if lines[device] is not before[device] and (
+                    lines[device] != before[device] or lines[device].spans != before[device].spans
+                ):
                     self.replace_option_prompt(str(device), lines[device])
             return
         chosen, top = self.chosen, self.scroll_offset.y
+        resized, self._each = each != self._each, each
         self.clear_options()
         self.add_options(entry(lines[device], id=str(device)) for device in wanted)
         if chosen is not None and chosen in lines:
@@ -60,4 +83,98 @@ class DriveList(OptionList):
         elif lines:
             self.highlighted = 0
             return
-        self.scroll_to(y=top, animate=False, force=True)
+        if resized:
+            self.scroll_to_highlight()
+        else:
+            self.scroll_to(y=top, animate=False, force=True)
+
+    # Drawing: Textual would draw the whole list for each change
+
+    def watch_highlighted(self, before: int | None, highlighted: int | None) -> None:  # type: ignore[override]
+        """Draw the two drives between which the cursor moved."""
+        self._refresh_drive(before)
+        self._refresh_drive(highlighted)
+        super().watch_highlighted(highlighted)
+
+    def replace_option_prompt(self, option_id: str, prompt: VisualType) -> Self:
+        """Draw a changed drive again."""
+        index = self.get_option_index(option_id)
+        shown = signs(prompt) if isinstance(prompt, Text) else prompt
+        self.get_option_at_index(index)._set_prompt(shown)
+        for row in range(self._each):
+            self._strips.pop((index, row, False), None)
+            self._strips.pop((index, row, True), None)
+        self._refresh_drive(index)
+        return self
+
+    def _refresh_drive(self, index: int | None) -> None:
+        top = (index or 0) * self._each - self.scroll_offset.y
+        if index is not None and top + self._each > 0 and top < self.size.height:
+            self.refresh(Region(0, top, self.size.width, self._each))
+
+    def _clear_caches(self) -> None:
+        self._strips.clear()
+        super()._clear_caches()
+
+    def notify_style_update(self) -> None:
+        """Draw again when colors change, as with the focus."""
+        self._strips.clear()
+        self._under.clear()
+        super().notify_style_update()
+
+    def _update_lines(self) -> None:
+        """Give each drive its rows; Textual would measure each of them."""
+        if not self.scrollable_content_region:
+            return
+        cache, each = self._line_cache, self._each
+        for index in range(len(cache.heights), len(self.options)):
+            cache.index_to_line[index] = index * each
+            cache.heights[index] = each
+            cache.lines.extend((index, row) for row in range(each))
+        size = Size(self.scrollable_content_region.width, len(cache.lines))
+        if size != self.virtual_size:
+            self.virtual_size = size
+            self._scroll_update(size)
+
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """Draw the rows of a region; without a border, most of Textual's work is skipped."""
+        self._update_lines()
+        if self.size != self.outer_size:
+            return super().render_lines(crop)
+        strips = [self.render_line(y) for y in crop.line_range]
+        for filter_ in self.get_line_filters():
+            background = self.background_colors[1]
+            strips = [strip.apply_filter(filter_, background) for strip in strips]
+        if crop.column_span != (0, self.scrollable_content_region.width):
+            strips = [strip.crop(*crop.column_span) for strip in strips]
+        return strips
+
+    def render_line(self, y: int) -> Strip:
+        """Draw one row of a drive."""
+        width = self.scrollable_content_region.width
+        index, row = divmod(self.scroll_offset.y + y, self._each)
+        if index >= len(self.options):
+            return Strip.blank(width, self._style_under(chosen=False))
+        key = index, row, index == self.highlighted
+        strip = self._strips.get(key)
+        if strip is None or strip.cell_length != width:
+            strip = self._strips[key] = self._draw(*key, width)
+        return strip
+
+    def _draw(self, index: int, row: int, chosen: bool, width: int) -> Strip:
+        prompt = self.options[index].prompt
+        lines = prompt.split("\n") if isinstance(prompt, Text) else [Text(str(prompt))]
+        line = lines[row] if row < len(lines) else Text("")
+        text = line.plain
+        if chosen and row == 0 and text.startswith(" "):
+            text = CURSOR_SIGN + text[1:]
+        strip = strip_of(text, tuple(line.spans), "", width, self._style_under(chosen=chosen))
+        return strip.apply_meta({"option": index})
+
+    def _style_under(self, *, chosen: bool) -> Style:
+        """Return the colors below the text of a row; cached, as Textual computes them slowly."""
+        style = self._under.get(chosen)
+        if style is None:
+            names = ("option-list--option", *([UNDER_CURSOR] if chosen else ()))
+            style = self._under[chosen] = self.get_visual_style(*names).rich_style
+        return style

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
 
+WIDE_ABOUT = 120
+"""Columns from which everything about a drive is in one row."""
 ABOUT, LEFT_LINES = 2, 3
 """Rows about a drive, and maximum rows about a motor that no program commands."""
 
@@ -82,13 +84,15 @@ def about_lines(
     """
     use = use_text(line) if line is not None else ""
     parts = [about_drive(drive), next_step(drive) or use] if drive else ["", use] if use else []
+    if wide := width >= WIDE_ABOUT and line is not None:
+        parts = [" · ".join(part for part in parts if part)]
     lines = [Text(f" {short(plain(part), width - 2)}", FAINT) for part in parts]
     first: list[Text] = []
     if left:
         del lines[1:]
         text = f"{left} Press Enter to open it, then Space to stop it or T to take it over."
         first = [Text(f" {row}", ATTENTION) for row in wrapped(text, width - 2, LEFT_LINES)]
-    lines += [Text("")] * (ABOUT - len(lines) - len(first))
+    lines += [Text("")] * ((1 if wide else ABOUT) - len(lines) - len(first))
     if line is None:
         return [*first, *lines]
     from .health_view import health_lines  # imported late: speeds up the start

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from rich.text import Text
+from textual.events import Resize
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
@@ -91,6 +92,11 @@ class LineList(OptionList):
         self._here = _key(shown) if shown else ""
         self._open = frozenset(_key(text) for text in opened if text)
         self._fill()
+
+    def on_resize(self, event: Resize) -> None:
+        """Fit the lines to the new width, once the list is visible."""
+        if event.size.width and self._shown is not None:
+            self._fill()
 
     def _fill(self) -> None:
         width = max(12, (self.size.width or list_width(self.app.size.width)) - 1)

@@ -22,7 +22,7 @@ REGISTERED = (
                 "new",
                 "Type a line to open: serial, TCP, RTU over TCP, simulated.",
             ),
-            ("stop_scan", "escape", "", "Leave the field, then end the scan."),
+            ("stop_scan", "escape", "", "Leave the field, end the scan, or return to the drives."),
             ("scan_settings", "", "", SCAN_SETTINGS),
             ("refresh_lines", "", "", "Update the list of serial ports."),
             ("disconnect", "", "", "Close the line. Asks first if a drive reacts to that."),

@@ -2,77 +2,176 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from ..state_words import state_cell, value_cell
+from ..frame_source import other_commander
+from ..state_words import state_cell, state_words, value_cell
 from .found import profile_text
-from .wall import WallRow
+from .wall import WallRow, aligned, spaced_age
 
 if TYPE_CHECKING:
     from tui.bus.api import Contact
+    from tui.drive.profile.schema import Quantity
     from tui.session.console import DriveConsole
     from tui.session.drive_state import DriveState
     from tui.session.fleet import Fleet, FoundDrive
+    from tui.session.monitor.alarms import PresentFault
     from tui.session.monitor.look import Look
     from tui.session.shown import Shown
 
 TRUSTED_LOOKS = 3
 """Number of check periods after which a value no longer counts as current."""
 
-VAIN: Mapping[str, tuple[str, str]] = {
-    "silent": ("no answer", "lost"),
-    "refused": ("refuses reads", "refuses reads"),
-    "damaged": ("bad replies", "bad replies"),
-    "swapped": ("bytes swapped", "bytes swapped"),
-    "not_polled": ("not polled", "not polled"),
+VAIN: Mapping[Contact, str] = {
+    "silent": "NO ANSWER",
+    "refused": "REFUSES READS",
+    "damaged": "BAD REPLIES",
+    "swapped": "BYTES SWAPPED",
+    "not_polled": "not polled",
 }
-"""Words for a failed check: while the values are current, and once they are too old."""
-
-Seen = tuple["DriveState | None", Mapping[str, "Shown"], float | None, bool, "Contact"]
-"""State, readings, their age in s, True if that is too old, result of the last check."""
+"""Words for a failed check."""
+NO_COMMANDER = "no commander"
 
 
-def rows_of(fleet: Fleet, now: float, *, connected: bool) -> dict[int, WallRow]:
-    """Return a row for each drive found, by device; `now` is on the line's clock."""
+class Seen(NamedTuple):
+    """Values read last from a drive."""
+
+    state: DriveState | None
+    readings: Mapping[str, Shown]
+    age: float | None
+    """Age of the readings in seconds; None if there are none."""
+    old: bool
+    """True if they no longer count as current."""
+    contact: Contact
+    """Result of the last check."""
+
+
+class RowMessage(NamedTuple):
+    """Fault, alarm or silence of a drive."""
+
+    parts: tuple[str, str] = ("", "")
+    brief: str = ""
+    kind: str = ""
+
+
+def rows_of(
+    fleet: Fleet,
+    now: float,
+    *,
+    connected: bool,
+    wall: float = 0.0,
+    curves: Mapping[int, tuple[str, ...]] | None = None,
+) -> dict[int, WallRow]:
+    """Return a row for each drive found, by device.
+
+    `now` is on the line's clock, `wall` the same moment in seconds since 1970. `curves` are drawn
+    curves by device.
+    """
     looks, period = fleet.line_watch.looks, fleet.line_watch.glance_period
-    return {
-        device: _row(drive, fleet, looks.get(device), (now, period), connected)
+    faults = {fault.device: fault for fault in fleet.alarms.active}
+    rows = [
+        _row(drive, fleet, looks.get(device), (now, period), connected)._replace(
+            curve=(curves or {}).get(device, ())
+        )
         for device, drive in fleet.found.items()
+    ]
+    rows = [_with_fault(row, faults.get(row.device), wall) for row in rows]
+    frequencies = aligned([row.frequency for row in rows])
+    currents = aligned([row.current for row in rows])
+    return {
+        row.device: row._replace(
+            frequency=frequency,
+            current=current,
+            reference=_padded(row.reference, row.frequency, frequency),
+        )
+        for row, frequency, current in zip(rows, frequencies, currents, strict=True)
     }
+
+
+def _padded(reference: str, frequency: str, shown: str) -> str:
+    """Return a reference with the spaces by which its frequency was aligned."""
+    return reference + " " * (len(shown) - len(frequency)) if reference else ""
 
 
 def _row(
     drive: FoundDrive, fleet: Fleet, look: Look | None, at: tuple[float, float], connected: bool
 ) -> WallRow:
     identity, console = drive.identity, drive.console
-    who = identity.reference or profile_text(drive) or "unknown drive"
+    model = identity.reference or profile_text(drive) or "unknown drive"
     if console is None:
-        return WallRow(identity.device, who, identity.name, words="no profile")
-    state, readings, age, old, contact = _seen(console, look, *at)
+        return WallRow(identity.device, identity.name, model, words="no profile")
+    seen = _seen(console, look, *at)
     report = fleet.stopper.reports.get(identity.device)
-    kind, words = state_cell(console.session, state, report, at[0], readings)
-    if kind not in ("stop", "stop failed"):
-        words = _called(state, words)
-    if kind == "running" and fleet.left_behind(console):
-        words = f"no commander, {words}"
+    kind, words = state_cell(console.session, seen.state, report, at[0], seen.readings)
+    message = _message(console, fleet, seen)
     if not connected:
-        kind, words, old = "none", "not known", True
-    elif contact != "answers":
-        kind, words = "none" if contact == "not_polled" else "unknown", VAIN[contact][old]
+        kind, words, seen = "none", "not known", seen._replace(old=True)
+        message = _silent(console, look, seen)
+    elif seen.contact != "answers":
+        kind, words = "none" if seen.contact == "not_polled" else "unknown", VAIN[seen.contact]
+        message = _silent(console, look, seen)
+        seen = seen._replace(old=True)
+    elif seen.old and seen.age is not None:
+        message = RowMessage((f"{spaced_age(seen.age)} old", ""), spaced_age(seen.age), "alarm")
+    current, unit = _figure(console, seen.readings, "motor_current")
     return WallRow(
         device=identity.device,
-        drive=who,
         name=identity.name,
+        model=model,
         kind=kind or "none",
         words=words,
-        frequency=_figure(console, readings, "output_frequency")[0],
-        current=_figure(console, readings, "motor_current")[0],
-        current_unit=_figure(console, readings, "motor_current")[1],
-        share=_share(console, readings),
-        age=None if age is None else float(int(age)),  # whole seconds: fewer redraws
-        old=old,
+        frequency=_figure(console, seen.readings, "output_frequency")[0],
+        reference=_ahead(console, seen) if kind == "running" and not seen.old else "",
+        current=current,
+        current_unit=unit,
+        share=_share(console, seen.readings),
+        # whole seconds, and only if it is shown: fewer rows are drawn again
+        age=float(int(seen.age)) if seen.old and seen.age is not None else None,
+        old=seen.old,
+        message=message.parts,
+        brief=message.brief,
+        message_kind=message.kind,
     )
+
+
+def _message(console: DriveConsole, fleet: Fleet, seen: Seen) -> RowMessage:
+    """Return the alarm of a drive that answers, or its commander if that is another one."""
+    state = seen.state
+    if state is None or state.kind == "fault":
+        return RowMessage()
+    if state.alarm or state.alarms:
+        named = f"▲ {state.alarms[0].name.lower()}" if state.alarms else "▲ alarm"
+        more = f"and {len(state.alarms) - 1} more" if len(state.alarms) > 1 else ""
+        return RowMessage((named, more), "▲", "alarm")
+    if state.kind == "running" and fleet.left_behind(console):
+        return RowMessage((NO_COMMANDER, ""), "!", "alarm")
+    by = other_commander(fleet, console.device, state)
+    return RowMessage((f"by {by}", "")) if by else RowMessage()
+
+
+def _silent(console: DriveConsole, look: Look | None, seen: Seen) -> RowMessage:
+    """Return how old the values of a drive are that is not read now, and its last state."""
+    if seen.age is None:
+        return RowMessage(kind="alarm")
+    age = spaced_age(seen.age)
+    before = look.before if look is not None and look.error else look
+    state = seen.state or (before.state if before is not None else None)
+    was = state_words(console.session, state, seen.readings)[1] if state is not None else ""
+    return RowMessage((f"for {age}", f"was {was}" if was else ""), age, "alarm")
+
+
+def _with_fault(row: WallRow, fault: PresentFault | None, wall: float) -> WallRow:
+    """Return the row with the name of its fault and the time since the trip."""
+    if fault is None or row.kind != "fault":
+        return row
+    since = spaced_age(max(0.0, wall - fault.wall))
+    if not fault.tripped:
+        since = f">{since}"  # it was in fault when first read
+    at = time.strftime("%H:%M:%S", time.localtime(fault.wall))
+    parts = fault.name.lower(), f"{since} · {at}" if fault.tripped else f"{since} · seen {at}"
+    return row._replace(message=parts, brief=since, message_kind="fault")
 
 
 def _seen(console: DriveConsole, look: Look | None, now: float, period: float) -> Seen:
@@ -87,21 +186,15 @@ def _seen(console: DriveConsole, look: Look | None, now: float, period: float) -
         each = max(snapshot.period, 1.0) if console.monitor.running else period
         longest = TRUSTED_LOOKS * each
         old = age is None or age > longest
-        return snapshot.state, snapshot.readings, age, old, snapshot.contact
+        return Seen(snapshot.state, snapshot.readings, age, old, snapshot.contact)
     if look is None:
-        return None, {}, None, False, "not_polled"
+        return Seen(None, {}, None, False, "not_polled")
     brought = look.before if look.error else look
     if brought is None:
-        return None, {}, None, True, look.contact
+        return Seen(None, {}, None, True, look.contact)
     age = max(0.0, now - brought.time)
-    return brought.state, brought.readings, age, age > TRUSTED_LOOKS * period, look.contact
-
-
-def _called(state: DriveState | None, words: str) -> str:
-    """Return the state of the status bar in lower case; a fault by its code and name."""
-    if state is not None and state.kind == "fault" and state.fault is not None:
-        return f"{state.fault.code} {state.fault.name.lower()}".strip()
-    return words.lower()
+    old = age > TRUSTED_LOOKS * period
+    return Seen(brought.state, brought.readings, age, old, look.contact)
 
 
 def _figure(console: DriveConsole, readings: Mapping[str, Shown], quantity: str) -> tuple[str, str]:
@@ -112,6 +205,25 @@ def _figure(console: DriveConsole, readings: Mapping[str, Shown], quantity: str)
     parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
     sign = "?" if text and parameter is not None and not is_verified(parameter) else ""
     return text + sign, unit
+
+
+REACHED = 0.05
+"""Difference in Hz up to which a frequency has reached its reference."""
+
+
+def _ahead(console: DriveConsole, seen: Seen) -> str:
+    """Return the reference of a motor that has not reached it; empty if it has, or if unknown."""
+    profile = console.session.profile
+    found = []
+    quantities: tuple[Quantity, ...] = ("frequency_reference", "output_frequency")
+    for quantity in quantities:
+        parameter = profile.quantity(quantity)
+        reading = seen.readings.get(parameter.code) if parameter else None
+        found.append(reading.current_number if reading is not None else None)
+    reference, frequency = found
+    if reference is None or frequency is None or abs(abs(reference) - abs(frequency)) <= REACHED:
+        return ""
+    return _figure(console, seen.readings, "frequency_reference")[0]
 
 
 def _share(console: DriveConsole, readings: Mapping[str, Shown]) -> float | None:

@@ -261,9 +261,12 @@ class Scanning(LineView):
         self.app.show_monitor(drive.console)
 
     def action_stop_scan(self) -> None:
-        """Leave a field and keep its text; outside a field, end the scan."""
+        """Leave a field and keep its text; then end the scan, or return to the drives."""
         if isinstance(self.focused, Input):
             self.lines.focus()
+            return
+        if self.found and not self.scanning and self.focused is self.lines:
+            self.drives.focus()
             return
         stopped = self.scanning
         self.end_search()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
+from textual.events import DescendantFocus
 from textual.widgets import Input, OptionList
 
 from tui.bus.errors import LineError
@@ -90,6 +91,11 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
             self.form.offer_settings(self.lines.choice(event.option.id))
         else:
             self.show_about()
+
+    def on_descendant_focus(self, event: DescendantFocus) -> None:
+        """Show the lines and the form when the cursor goes there, and hide them when it leaves."""
+        if self.is_current and self.found:
+            self._give_room()
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Scan the open line at the typed addresses; from another field, open the chosen line."""

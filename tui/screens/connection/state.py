@@ -16,46 +16,28 @@ from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
 from tui.session.connect.named_lines import line_settings
+from tui.widgets.curve import curve_signs
 from tui.widgets.drawing import pair, rule
 from tui.widgets.lines import Lines
-from tui.widgets.palette import PLAIN
+from tui.widgets.palette import FAINT, KEY, PLAIN, STRONG
 
 from ..base import PanelScreen
 from ..frame import SELDOM
 from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines, hint_for
+from .choices import LIST_MARKS, ListMark
 from .drive_list import DriveList
 from .found import about_lines
 from .line_form import LineForm
 from .line_list import LineList
-from .rows import rows_of
-from .wall import WallRow, column_heads, columns_for, heading, in_order, wall_line
+from .progress import far_text, left_text, scan_forms
+from .rows import TRUSTED_LOOKS, rows_of
+from .wall import WallColumns, WallRow, column_heads, columns_for, heading, wall_line
+from .wall_curves import CurveCells, WallCurves
 
 if TYPE_CHECKING:
     from tui.session.connect.search import Search
-    from tui.session.fleet import FoundDrive
+    from tui.session.fleet import Fleet, FoundDrive
     from tui.session.monitor.look import Look
-
-IN_MINUTES = 100
-"""Seconds from which a remaining time is shown in minutes."""
-
-
-def left_text(search: Search | None, later: float) -> str:
-    """Return the remaining time of a search plus `later` seconds; empty if it is unknown."""
-    if search is None or search.ended or not search.cost:
-        return ""
-    seconds = search.left + later
-    return f"{seconds / 60:.0f} min" if seconds >= IN_MINUTES else f"{max(1, round(seconds))} s"
-
-
-def far_text(search: Search, later: float, room: int) -> str:
-    """Return the progress of a search in `room` cells, with the remaining time if it is known."""
-    left = left_text(search, later)
-    if not left:
-        return search.text
-    requested = search.text.partition(",")[0]
-    forms = (f"{search.text}, {left} left", f"{requested}, {left} left", f"{requested}, {left}")
-    return next((form for form in forms if len(form) <= room), forms[-1])
-
 
 log = logging.getLogger(__name__)
 
@@ -75,11 +57,16 @@ KEPT_FROM_REACTING = (
     " communication timeout."
 )
 """Events shown once per drive, with its address and communication timeout in s."""
+WIDE_CLASS = "-wide"
+"""Class of the screen while the drives have the whole width."""
 NOBODY: Mapping[int, WallRow] = MappingProxyType({})
 
 
 class LineView(PanelScreen):
-    """Lines on the left, drives on the right, details of the chosen drive below."""
+    """Lines on the left, drives on the right, details of the chosen drive below.
+
+    While the cursor is on the drives, they have the whole width, and the lines one row above.
+    """
 
     _was_shown = False
 
@@ -98,9 +85,11 @@ class LineView(PanelScreen):
         self._away = self._was_lost = False
         self._typed_at = -math.inf
         """Time of the last key press, in seconds on the monotonic clock."""
+        self._curves = WallCurves()
 
     def body(self) -> ComposeResult:
         """Yield the two columns, and the details of the chosen drive below."""
+        yield Lines(id="open-lines")
         with Horizontal(id="body"):
             with Vertical(id="left"):
                 yield Lines(id="lines-title", fit=_lines_title)
@@ -199,24 +188,66 @@ class LineView(PanelScreen):
         """Redraw the drives; does nothing below another screen."""
         if not self.is_current:
             return
+        self._give_room()
         fleet, width = self.app.fleet, max(20, self.drives.size.width - 1)
-        columns = columns_for(width)
-        now = self.app.clock.monotonic()
-        rows = rows_of(fleet, now, connected=self._connected()) if fleet else {}
-        faults = [fault.device for fault in fleet.alarms.active] if fleet else []
-        faults += [row.device for row in rows.values() if row.kind == "fault"]
-        order = in_order(rows, list(dict.fromkeys(faults)))
+        now, wall = self.app.clock.monotonic(), self.app.clock.wall()
+        two_rows = 2 * len(self.found) <= self.drives.size.height
+        columns = columns_for(width, two_rows=two_rows)
+        curves: Mapping[int, tuple[str, ...]] = {}
+        scale: float | None = None
+        if fleet is not None and columns.curve:
+            curves, scale = self._draw_curves(fleet, columns, now, wall)
+        connected = self._connected()
+        rows = rows_of(fleet, now, connected=connected, wall=wall, curves=curves) if fleet else {}
         lines = {device: wall_line(row, columns) for device, row in rows.items()}
-        self.drives.fill(lines, order, sort=self._is_user_idle())
+        self.drives.fill(lines, rows, sort=self._is_user_idle())
         width = self.query_one("#drives-title").size.width
         self.put("drives-title", self._drives_title(width, rows))
-        self.put("columns", [column_heads(columns)] if rows else [])
+        self.put("columns", [column_heads(columns, scale)] if rows else [])
         self._show_advice()
         self.show_about()
 
+    def _draw_curves(
+        self, fleet: Fleet, columns: WallColumns, now: float, wall: float
+    ) -> tuple[Mapping[int, tuple[str, ...]], float]:
+        """Return the curves of the last minute by device, and the end of their scale in Hz."""
+        signs = curve_signs(plain=self.app.plain_signs, braille=self.app.has_braille)
+        reach = TRUSTED_LOOKS * fleet.line_watch.glance_period
+        cells = CurveCells(columns.curve, columns.rows, signs)
+        return self._curves.draw(fleet.consoles, cells, now=now, wall=wall, reach=reach)
+
+    def _give_room(self) -> None:
+        """Give the drives the whole width while the cursor is not on the lines or the form."""
+        left = self.query_one("#left")
+        focused = self.focused
+        wide = bool(self.found) and (focused is None or left not in focused.ancestors)
+        if wide is not self.has_class(WIDE_CLASS):
+            self.set_class(wide, WIDE_CLASS)
+            self.call_after_refresh(self._redraw)
+        if wide:
+            self.put("open-lines", [self._open_lines()])
+
+    def _open_lines(self) -> Text:
+        """Return the open lines with their numbers of drives, and the keys for another."""
+        text = Text(" Lines ", FAINT, no_wrap=True)
+        lines = self.app.panel_lines
+        if not lines and self.app.fleet is not None:
+            text.append(" ").append(*LIST_MARKS["shown"]).append(self.app.line_label, STRONG)
+            text.append(f" {len(self.found)}  ", FAINT)
+        for line in lines:
+            shown = line.opened is self.app.opened
+            faulty = bool(line.fleet.alarms.active)
+            mark: ListMark = "shown" if shown else "fault" if faulty else "open"
+            text.append(" ").append(*LIST_MARKS[mark])
+            text.append(line.opened.label, STRONG if shown else PLAIN)
+            text.append(f" {len(line.fleet.found)}  ", FAINT)
+        for key, does in ((".", "drive"), ("n", "new"), ("Tab", "lines")):
+            text.append(f" {key}", KEY).append(f" {does}  ", FAINT)
+        return text
+
     def _drives_title(self, width: int, rows: Mapping[int, WallRow] = NOBODY) -> list[Text]:
-        requested = len({*rows, *(self.search.devices if self.search else ())})
-        return [heading(self.app.line_label or "No line", list(rows.values()), requested, width)]
+        scan, label = scan_forms(self.search, self.later), self.app.line_label or "No line"
+        return [heading(label, list(rows.values()), scan, width)]
 
     def show_about(self) -> None:
         """Show details of the drive under the cursor, its next step, and line health."""

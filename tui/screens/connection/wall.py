@@ -1,15 +1,18 @@
-"""Table of the drives of a line: a row for each, in fixed columns. Pure functions."""
+"""Table of the drives of a line: one or two rows for each, in fixed columns. Pure functions."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import math
+from collections import Counter
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 from rich.style import Style
 from rich.text import Text
 
-from tui.widgets.drawing import cut, rule, short
+from tui.drive.sentences import counted
+from tui.widgets.drawing import cut, short
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
@@ -18,11 +21,14 @@ from tui.widgets.palette import (
     FAINT,
     FAULT,
     FAULT_BLOCK,
+    KEY,
     LINE,
     PLAIN,
     RUNNING,
+    STALE,
     STATE_SIGNS,
     STRONG,
+    TITLE,
 )
 
 STATE_STYLE: dict[str, Style] = {
@@ -37,6 +43,9 @@ STATE_STYLE: dict[str, Style] = {
     "blocked": FAINT,
 }
 WALL_SIGNS = {**STATE_SIGNS, "stop": "▼", "stop failed": "■", "none": " "}
+TURNING_KINDS = frozenset({"running", "stop", "stopping", "stop failed"})
+"""Kinds of state in which the motor may turn."""
+MESSAGE_STYLES: dict[str, Style] = {"fault": FAULT, "alarm": ALARM, "": FAINT}
 FULL = "━"
 
 
@@ -44,12 +53,15 @@ class WallRow(NamedTuple):
     """Drive at one moment, as text; unknown values are empty."""
 
     device: int
-    drive: str
     name: str = ""
+    """Name that it reports; empty if none."""
+    model: str = ""
     kind: str = "none"
     """Kind of its state; `stop` or `stop failed` during a stop, `none` without a state."""
     words: str = ""
     frequency: str = ""
+    reference: str = ""
+    """Frequency that a running motor has not reached yet."""
     current: str = ""
     current_unit: str = "A"
     share: float | None = None
@@ -58,110 +70,234 @@ class WallRow(NamedTuple):
     """Seconds since the shown values were received; None if there are none."""
     old: bool = False
     """True if the values are too old to count as current."""
+    message: tuple[str, str] = ("", "")
+    """Fault, alarm or silence in two parts, for two rows or one after the other."""
+    brief: str = ""
+    """The time since a trip, or the age of old values; for a narrow column."""
+    message_kind: str = ""
+    """`fault`, `alarm`, or empty if nothing needs attention."""
+    curve: tuple[str, ...] = ()
+    """Rows of the curve of the last minute; empty if there is no room for it."""
 
 
 class WallColumns(NamedTuple):
-    """Widths of the variable columns in cells; 0 hides a column."""
+    """Widths of the variable columns in cells, and the rows of a drive; 0 hides a column."""
 
-    drive: int
     name: int
+    """The name, or the model of a drive without one."""
+    model: int
+    """The model beside the name; with two rows for a drive it is below the name."""
     state: int
     load: int
+    curve: int
+    message: int
+    rows: int = 1
 
     @property
     def taken(self) -> int:
-        """Cells of a whole row, with device, Hz, A and age."""
-        given = (self.drive, self.name, self.state, self.load)
-        return DEVICE + HERTZ + CURRENT + AGE + 1 + sum(width + 1 for width in given if width)
+        """Cells of a whole row, with device, Hz and A."""
+        given = (self.name, self.model, self.state, self.load, self.curve, self.message)
+        return DEVICE + HERTZ + CURRENT + sum(width + 1 for width in given if width)
 
 
-DEVICE, HERTZ, CURRENT, AGE = 3, 6, 7, 5
-WIDEST_STATE = 30
-LAYOUTS = (
-    WallColumns(20, 20, 24, 24),
-    WallColumns(16, 18, 20, 14),
-    WallColumns(14, 12, 15, 10),
-    WallColumns(14, 12, 15, 0),
-    WallColumns(13, 0, 15, 0),
-    WallColumns(12, 0, 14, 0),
-    WallColumns(11, 0, 13, 0),
-    WallColumns(8, 0, 12, 0),
-    WallColumns(0, 0, 12, 0),
-    WallColumns(0, 0, 10, 0),
+DEVICE, HERTZ, CURRENT = 4, 7, 8
+WIDEST_MESSAGE = 60
+LEAST_MESSAGE = 14
+"""Cells from which a message is shown; a narrower column has its brief form."""
+SINGLE_ROWS = (
+    WallColumns(20, 16, 14, 16, 42, 38),
+    WallColumns(14, 14, 13, 0, 24, 26),
+    WallColumns(12, 0, 13, 0, 18, 24),
+    WallColumns(11, 0, 13, 0, 12, 20),
+    WallColumns(10, 0, 12, 0, 12, 6),
+    WallColumns(9, 0, 11, 0, 6, 8),
+    WallColumns(9, 0, 12, 0, 0, 8),
+    WallColumns(8, 0, 11, 0, 0, 6),
+    WallColumns(0, 0, 10, 0, 0, 5),
 )
-"""Layouts from wide to narrow: the load is hidden first, then the name, then the drive."""
+"""Layouts from wide to narrow with one row for a drive."""
+DOUBLE_ROWS = (
+    WallColumns(20, 0, 16, 20, 42, 46, 2),
+    WallColumns(14, 0, 16, 15, 24, 26, 2),
+    WallColumns(12, 0, 13, 0, 18, 24, 2),
+    WallColumns(12, 0, 13, 0, 12, 19, 2),
+)
+"""The same with two rows."""
+TICKS = 6
+"""Parts of the page of a curve; dots below a curve are between them."""
 
 
-def columns_for(width: int) -> WallColumns:
-    """Return the widest layout that fits; spare cells go to the state, which has fault names."""
-    found = next((layout for layout in LAYOUTS if layout.taken <= width), LAYOUTS[-1])
-    return found._replace(state=min(WIDEST_STATE, found.state + max(0, width - found.taken)))
+def columns_for(width: int, *, two_rows: bool = False) -> WallColumns:
+    """Return the widest layout that fits; spare cells go to the message.
+
+    Two rows for a drive are used only if they fit.
+    """
+    layouts = (*(DOUBLE_ROWS if two_rows else ()), *SINGLE_ROWS)
+    found = next((layout for layout in layouts if layout.taken <= width), SINGLE_ROWS[-1])
+    spare = max(0, width - found.taken)
+    return found._replace(message=min(WIDEST_MESSAGE, found.message + spare))
 
 
-def in_order(devices: Iterable[int], faults: Sequence[int]) -> list[int]:
-    """Sort devices: those in `faults` first and in that order, then the others by address."""
-    first = {device: place for place, device in enumerate(faults)}
-    return sorted(devices, key=lambda device: (first.get(device, len(first)), device))
+def aligned(texts: Sequence[str]) -> list[str]:
+    """Return numbers with their decimal points below each other once they are right-aligned."""
+    places = [len(text.partition(".")[2]) for text in texts]
+    most = max(places, default=0)
+    # without a point, a number ends where the others have theirs
+    return [
+        text + " " * (most - digits + (not digits and bool(most))) if text else ""
+        for text, digits in zip(texts, places, strict=True)
+    ]
 
 
-def heading(label: str, rows: Sequence[WallRow], requested: int, width: int) -> Text:
-    """Draw the title of the table: line, number in fault, number lost, number that answered.
+FIRST_STATES, LAST_STATES = ("running",), ("fault", "no answer")
 
-    `requested` is the number of addresses in the scan.
+
+def state_counts(rows: Sequence[WallRow]) -> list[tuple[str, int, Style]]:
+    """Return each state of the drives with its number and style: the running ones first."""
+    found = Counter(_counted_as(row) for row in rows)
+    others = sorted(found.keys() - {*FIRST_STATES, *LAST_STATES})
+    styles = {"running": RUNNING, "fault": FAULT, "no answer": ALARM, "not stopped": FAULT}
+    order = (*FIRST_STATES, *others, *LAST_STATES)
+    return [(name, found[name], styles.get(name, PLAIN)) for name in order if found[name]]
+
+
+def _counted_as(row: WallRow) -> str:
+    if row.kind in ("running", "fault"):
+        return row.kind
+    return row.words.lower() or "unknown"
+
+
+def heading(label: str, rows: Sequence[WallRow], scan: Sequence[str], width: int) -> Text:
+    """Draw the title of the table: the number of drives in each state, and the scan.
+
+    Without a drive it is the name of the line. `scan` are forms of one text, of which the first
+    that fits is shown.
     """
     if not rows:
-        return rule(short(label, max(4, width - 2)), width)
-    faults = sum(row.kind == "fault" for row in rows)
-    lost = sum(row.words == "lost" for row in rows)
-    parts = [(f"{faults} in fault", FAULT)] if faults else []
-    parts += [(f"{lost} lost", ALARM)] if lost else []
-    parts.append((f"{len(rows)} of {max(requested, len(rows))}", PLAIN))
-    tail = Text(no_wrap=True)
-    for number, (words, style) in enumerate(parts):
-        tail.append(" · " if number else " ", FAINT)
-        tail.append(words, style)
-    text = rule(short(label, max(4, width - tail.cell_len - 4)), width - tail.cell_len - 2)
-    text.append_text(tail)
-    return text.append(" ─", LINE)
+        text = Text(f"{short(label, max(4, width - 2))} ", TITLE, no_wrap=True)
+        return text.append("─" * max(0, width - text.cell_len), LINE)
+    text = Text(no_wrap=True)
+    text.append(counted(len(rows), " 1 drive: ", " {count} drives: "), STRONG)
+    counts = state_counts(rows)
+    for place, (name, number, style) in enumerate(counts):
+        part = f"{number} {name}s" if name == "fault" and number > 1 else f"{number} {name}"
+        rest = len(counts) - place - 1
+        if text.cell_len + len(part) + (5 if rest else 0) > width:
+            text.append("...", FAINT)
+            break
+        text.append(part, style).append(", " if rest else "", FAINT)
+    room = width - text.cell_len - 2
+    if form := next((form for form in scan if len(form) < room), ""):
+        text.append(f"{form:>{room + 1}} ", FAINT)
+    text.append(" " * max(0, width - text.cell_len))
+    text.truncate(width)
+    return text
 
 
-def column_heads(columns: WallColumns) -> Text:
-    text = Text(f"{'Dev':>{DEVICE + 1}}", FAINT, no_wrap=True)
-    for title, width in (("Drive", columns.drive), ("Name", columns.name)):
+def column_heads(columns: WallColumns, scale: float | None = None) -> Text:
+    """Draw the names of the columns; `scale` is the highest frequency of the curves in Hz."""
+    text = Text(f"{'Dev':>{DEVICE}}", FAINT, no_wrap=True)
+    for title, width in (("Drive", columns.name), ("Model", columns.model)):
         text.append(f" {title:<{width}}" if width else "")
-    text.append(f" {'State':<{columns.state}}{'Hz':>{HERTZ}}{'A':>{CURRENT}}")
+    text.append(f" {'State':<{columns.state}}{'Hz':>{HERTZ}}{'A':>{CURRENT - 1}} ")
     text.append(f"  {'Load':<{columns.load - 1}}" if columns.load else "")
-    return text.append(f"{'Age':>{AGE}}")
+    if columns.curve:
+        ranges = ["60 s", f"60 s, 0-{scale:g} Hz", f"Hz, 60 s, 0-{scale:g}"] if scale else ["60 s"]
+        text.append(f" {next(r for r in ranges[::-1] if len(r) <= columns.curve):<{columns.curve}}")
+    title = "Message" if columns.message >= LEAST_MESSAGE else ""
+    return text.append(f" {title:<{columns.message}}")
 
 
 @lru_cache(maxsize=512)
 def wall_line(row: WallRow, columns: WallColumns) -> Text:
-    """Draw a drive in one row; no column moves when a value changes.
+    """Draw a drive in one or two rows; no column moves when a value changes.
 
     The Text is cached: callers must not modify it.
     """
+    text = _first_row(row, columns)
+    if columns.rows == 2:
+        text.append("\n").append_text(_second_row(row, columns))
+    return text
+
+
+def _first_row(row: WallRow, columns: WallColumns) -> Text:
     text = Text(no_wrap=True, overflow="ellipsis")
-    text.append(f"{row.device:>{DEVICE + 1}}", FAINT)
-    if columns.drive:
-        text.append(f" {cut(row.drive, columns.drive)}", PLAIN)
+    text.append(f"{row.device:>{DEVICE}}", FAINT)
     if columns.name:
-        text.append(f" {cut(row.name, columns.name)}", FAINT)
+        named = row.name if columns.model or row.name else row.model
+        text.append(f" {cut(named, columns.name)}", STRONG if row.name else PLAIN)
+    if columns.model:
+        text.append(f" {cut(row.model, columns.model)}", FAINT)
     text.append(" ")
     state = f"{WALL_SIGNS.get(row.kind, '□')} {short(row.words, columns.state - 2)}"
     block = row.kind in ("fault", "stop failed")
     message = f"{state:<{columns.state}}" if block else state
     text.append(message, STATE_STYLE.get(row.kind, PLAIN))
     text.append(" " * (columns.state - len(message)))
-    turning = row.kind in ("running", "stop", "stopping", "stop failed") and not row.old
-    text.append(f"{short(row.frequency, HERTZ - 1):>{HERTZ}}", STRONG if turning else FAINT)
-    current = row.current + ("" if row.current_unit == "A" else row.current_unit[:1])
-    current = current if row.current else ""
-    text.append(f"{short(current, CURRENT - 1):>{CURRENT}}", PLAIN if turning else FAINT)
+    turning = row.kind in TURNING_KINDS
+    style = STALE if row.old else STRONG if turning else FAINT
+    text.append(f"{short(row.frequency, HERTZ - 1):>{HERTZ}}", style)
+    unit = "" if row.current_unit == "A" else row.current_unit[:1]
+    current = row.current + (unit or " ") if row.current else ""
+    style = STALE if row.old else PLAIN if turning else FAINT
+    text.append(f"{short(current, CURRENT - 1):>{CURRENT}}", style)
     if columns.load:
-        text.append("  ")
-        text.append_text(load_bar(None if row.old else row.share, columns.load - 1))
-    text.append(f"{_age(row.age):>{AGE}}", ALARM if row.old else FAINT)
-    return text
+        text.append("  ").append_text(load_cell(None if row.old else row.share, columns.load - 1))
+    if columns.curve:
+        _append_curve(text, row, 0, columns)
+    text.append(" ")
+    message = _message(row, columns)
+    return text.append(cut(message, columns.message), MESSAGE_STYLES[row.message_kind])
+
+
+def _message(row: WallRow, columns: WallColumns) -> str:
+    """Return the message of the first row, or all of it if there is only one row."""
+    first, rest = row.message
+    if columns.message < LEAST_MESSAGE:
+        return row.brief
+    if columns.rows == 2:
+        return first
+    if row.message_kind == "fault":
+        return f"{row.brief} · {first}"  # the time comes first: a long name is cut
+    if not first and row.reference:
+        return f"→ {row.reference.strip()} Hz"
+    return f"{first} · {rest}" if rest else first
+
+
+def _second_row(row: WallRow, columns: WallColumns) -> Text:
+    text = Text(" " * DEVICE, no_wrap=True, overflow="ellipsis")
+    text.append(f" {cut(row.model if row.name else '', columns.name)}", FAINT)
+    text.append(" " * (columns.state + 1))
+    old = spaced_age(row.age) if row.old else ""
+    if row.reference and not old:
+        text.append(f"{short(f'→ {row.reference}', HERTZ):>{HERTZ}}{'':>{CURRENT}}", KEY)
+    else:
+        text.append(f"{old:>{HERTZ}}{f'{old} ' if old else '':>{CURRENT}}", ALARM)
+    text.append(" " * (columns.load + 1 if columns.load else 0))
+    if columns.curve:
+        _append_curve(text, row, 1, columns)
+    return text.append(f" {cut(row.message[1], columns.message)}", FAINT)
+
+
+def _append_curve(text: Text, row: WallRow, at: int, columns: WallColumns) -> None:
+    """Append a row of the curve; below a curve, dots show every tenth second."""
+    cells = row.curve[at] if at < len(row.curve) else ""
+    cells = f"{cells:<{columns.curve}}"[: columns.curve]
+    style = STALE if row.old else STRONG if row.kind in TURNING_KINDS else FAINT
+    text.append(" ")
+    if at == 0 or cells.strip():
+        text.append(cells, style)
+        return
+    dots = {columns.curve * tick // TICKS for tick in range(TICKS)}
+    text.append("".join("·" if x in dots else " " for x in range(columns.curve)), LINE)
+
+
+def load_cell(share: float | None, width: int) -> Text:
+    """Draw the load as a bar and in percent; blank if `share` is None."""
+    if share is None:
+        return Text(" " * width)
+    percent = f"{min(share, 9.99) * 100:4.0f} %"
+    return load_bar(share, width - len(percent)).append(percent, FAINT)
 
 
 def load_bar(share: float | None, width: int) -> Text:
@@ -177,10 +313,11 @@ def load_bar(share: float | None, width: int) -> Text:
     return text.append("╴" if filled < inner else FULL, LINE if filled < inner else BAR)
 
 
-def _age(age: float | None) -> str:
-    """Format an age in whole seconds, minutes (m) or hours (h), in at most five cells."""
+def spaced_age(age: float | None) -> str:
+    """Format an age in whole seconds, minutes (m), hours (h) or days (d), in five cells at most."""
     if age is None:
         return ""
-    if age < 100:
-        return f"{age:.0f} s"
-    return f"{age / 60:.0f} m" if age < 6000 else f"{min(age / 3600, 999):.0f} h"
+    for seconds, unit in ((1, "s"), (60, "m"), (3600, "h")):
+        if age < 100 * seconds:
+            return f"{math.floor(age / seconds)} {unit}"
+    return f"{math.floor(min(age / 86400, 999))} d"

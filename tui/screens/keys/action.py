@@ -53,7 +53,7 @@ SHOWING = frozenset(
 )
 """Actions that move a cursor or show something, and do nothing else: their keys act at once.
 
-`step_drive` is not among them: it changes which motor the stop key stops.
+`step_drive` and `type_address` are not among them: they change which motor the stop key stops.
 """
 
 

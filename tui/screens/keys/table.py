@@ -36,6 +36,7 @@ STOPS_ALL, STOPS_NONE = "STOP ALL", "cannot stop here"
 SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
 OPEN = "Open a file: compare a parameter set, or stage an assignment."
 REPORT_DRIVE = "Report on the open drive: read everything and write a file (Markdown)."
+TYPE_ADDRESS = "Type the address of a drive on this line; Enter opens it."
 FIND = "Find a parameter by code, name, address or value; works on every screen."
 WIRING_HELP = "Show wiring and warnings of the family: pins, line rules, LEDs, commands, errata."
 WHY = "Diagnose why a silent drive gives no answer; show the next steps."
@@ -64,6 +65,7 @@ APP_ACTIONS: tuple[Action, ...] = (
     ),
     app_action("step_drive(-1)", "[", "", "Go to the previous drive on this line."),
     app_action("step_drive(1)", "]", "", "Go to the next drive on this line."),
+    app_action("type_address", ".", "", TYPE_ADDRESS),
     app_action("find", "/", "", FIND),
     app_action("messages", "m", "", "Show all messages, with their times."),
     app_action("wiring", "I", "", WIRING_HELP),

@@ -17,12 +17,10 @@ from tui.session.monitor.trend import TrendPoint
 from tui.session.shown import Shown
 from tui.session.timeout_report import TimeoutWatch
 from tui.widgets.curve import (
-    ASCII_SIGNS,
-    BLOCKS,
-    BRAILLE,
     PAGE_STEPS,
     CurveSigns,
     PageStep,
+    curve_signs,
     page_start,
 )
 from tui.widgets.palette import age_text
@@ -91,7 +89,7 @@ class View:
     @property
     def signs(self) -> CurveSigns:
         """Characters for curves that the terminal can show."""
-        signs = ASCII_SIGNS if self.plain else BRAILLE if self.braille else BLOCKS
+        signs = curve_signs(plain=self.plain, braille=self.braille)
         return signs if self.colored else signs._replace(grid=" ")
 
     @property

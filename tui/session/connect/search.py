@@ -12,6 +12,7 @@ from tui.bus.api import IdentificationObjects, LineCounters, ModbusLine, Priorit
 from tui.bus.errors import LineClosed, LineError, LineLost, NoAnswer
 from tui.bus.expectation import IDENTIFY
 from tui.drive.finding import PresenceProbe
+from tui.drive.sentences import counted
 
 from ..clock import REAL_CLOCK
 from .address_prober import AddressProber, probers_of
@@ -100,9 +101,8 @@ class Search:
         found = len(self.answered)
         if self.ended:
             return f"{self.ended}, {found or 'none'} found"
-        if self.again:
-            return f"{self.requested} of {self.of} again"
-        return f"{self.requested} of {self.of}, {found or 'none'} found"
+        far = f"{self.requested} of {counted(self.of, '1 address', '{count} addresses')}"
+        return f"{far} again" if self.again else f"{far}, {found or 'none'} found"
 
     async def run(self, line: ModbusLine, found: Found) -> None:
         """Run the search; calls `found` for every address that is not silent.
