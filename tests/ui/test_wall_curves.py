@@ -121,6 +121,24 @@ def test_values_of_a_silent_drive_are_old_and_have_their_age() -> None:
         assert ALARM in styles.values()
 
 
+def test_values_of_a_drive_that_has_just_become_silent_are_old_too() -> None:
+    before = fakes.look_of(fakes.RUNNING, age=5.0)
+    lost = Look(None, "No answer.", fakes.NOW - 1, None, {}, before, "silent")
+    row = rows_of(fleet_of(lost), fakes.NOW, connected=True)[3]
+    assert (row.old, row.age, row.reference) == (True, 5.0, "")
+
+
+def test_row_has_the_curve_of_its_drive() -> None:
+    looks = {device: fakes.look_of(fakes.RUNNING) for device in (3, 31)}
+    drives = [
+        FoundDrive(replace(fakes.ATV71, device=d), fakes.console_of(None, device=d)) for d in looks
+    ]
+    fleet = fakes.StillFleet(*drives, line_watch=fakes.FakeLineWatch(looks=looks))
+    curves = {31: ("high",), 3: ("low",)}
+    rows = rows_of(fleet, fakes.NOW, connected=True, curves=curves)
+    assert {device: row.curve for device, row in rows.items()} == curves
+
+
 def test_values_older_than_three_checks_are_old() -> None:
     for age, old in ((8.0, False), (10.0, True)):
         row = rows_of(fleet_of(fakes.look_of(fakes.RUNNING, age=age)), fakes.NOW, connected=True)[3]
