@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Self
 
 from rich.style import Style
 from rich.text import Text
+from textual.events import Resize
 from textual.geometry import Region, Size
 from textual.reactive import reactive
 from textual.strip import Strip
@@ -35,7 +36,19 @@ class DriveList(OptionList):
         if self.is_attached:
             super().update_node_styles(animate)
 
-    def __init__(self, *, id: str) -> None:
+    def __init__(
+        self,
+        *,
+        id: str,
+        moved: Callable[[], None] = lambda: None,
+        resized: Callable[[], None] = lambda: None,
+    ) -> None:
+        """`moved` is called when the cursor moves, so that one picture shows all of its effect.
+
+        `resized` is called when the list gets another width, in which its rows must fit.
+        """
+        self._moved, self._resized = moved, resized
+        self._width = 0
         self._each = 1
         """Rows of each drive."""
         self._strips: dict[tuple[int, int, bool], Strip] = {}
@@ -95,6 +108,8 @@ class DriveList(OptionList):
         self._refresh_drive(before)
         self._refresh_drive(highlighted)
         super().watch_highlighted(highlighted)
+        if self.is_mounted:
+            self._moved()
 
     def replace_option_prompt(self, option_id: str, prompt: VisualType) -> Self:
         """Draw a changed drive again."""
@@ -115,6 +130,12 @@ class DriveList(OptionList):
     def _clear_caches(self) -> None:
         self._strips.clear()
         super()._clear_caches()
+
+    def on_resize(self, event: Resize) -> None:
+        """Request rows for another width; the first ones are made for the present width."""
+        before, self._width = self._width, event.size.width
+        if before and before != self._width:
+            self._resized()
 
     def notify_style_update(self) -> None:
         """Draw again when colors change, as with the focus."""

@@ -86,11 +86,9 @@ class ConnectionScreen(DiagnosisTarget, OtherSettings):
             self.open_line(self.line_of(choice), choice.device)
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
-        """Show details of the chosen drive, or enable the serial settings for a chosen port."""
+        """Enable the serial settings for a chosen port."""
         if event.option_list is self.lines:
             self.form.offer_settings(self.lines.choice(event.option.id))
-        else:
-            self.show_about()
 
     def on_descendant_focus(self, event: DescendantFocus) -> None:
         """Show the lines and the form when the cursor goes there, and hide them when it leaves."""

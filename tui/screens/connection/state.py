@@ -100,7 +100,7 @@ class LineView(PanelScreen):
                 yield Lines(id="drives-title", fit=self._drives_title)
                 yield Lines(id="columns")
                 yield Lines(id="message", fit=self._advice_lines)
-                yield DriveList(id="drives")
+                yield DriveList(id="drives", moved=self.show_about, resized=self.show_drives)
         yield Lines(id="about")
 
     @property
