@@ -102,14 +102,24 @@ def ending_by_signal(panel: Stoppable, *, stop: bool) -> Iterator[list[int]]:
 
     def end(number: int) -> None:
         log.warning("ended by %s", signal_name(number))
-        if stop and not panel.stop_motors():
+        try:
+            stopped = not stop or panel.stop_motors()
+        except BaseException:
+            # a panel that stays without its terminal would keep its drives alive unseen
+            log.exception("the stops of a panel that ends")
+            stopped = False
+        if not stopped:
             log.error("a motor could not be stopped before the panel ended")
         last_resort = threading.Timer(CLEANED_UP, os._exit, (BY_SIGNAL + number,))
         last_resort.daemon = True
         last_resort.start()
-        panel.leave_now()
-        while not ended.wait(A_MOMENT):
-            panel.leave_now()
+        while True:
+            try:
+                panel.leave_now()
+            except Exception:
+                log.exception("the end of the panel")
+            if ended.wait(A_MOMENT):
+                return
 
     def handle(number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGINT and panel.failed:
