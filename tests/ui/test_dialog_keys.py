@@ -28,7 +28,7 @@ from tui.screens.command.teaching import PickWord, fault_of_look
 from tui.screens.connection.choices import fault_of_line
 from tui.screens.dialogs.address import AddressField
 from tui.screens.dialogs.ask import Ask, fault_of_new
-from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.confirm import Confirm, Consequences
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
@@ -122,7 +122,7 @@ def all_dialogs() -> set[str]:
         item = left.pop()
         left += item.__subclasses__()
         found.append(item)
-    bases = (Question, KeyQuestion)
+    bases = (Question, KeyQuestion, Consequences)
     return {
         cls.__name__
         for cls in found
