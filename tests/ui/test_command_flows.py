@@ -226,7 +226,7 @@ async def test_motor_at_standstill_after_a_quick_stop_is_not_stopping() -> None:
         assert "Stopped: stopped" not in shown(made.app, "said")
         await until(made.pilot, lambda: "□ STOPPED" in shown(made.app, "strip"))
         await made.pilot.press("1")
-        await until(made.pilot, lambda: "□ stopped" in picture(made.app))
+        await until(made.pilot, lambda: "□ STOPPED" in picture(made.app))
 
 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "powerdrive"))
@@ -471,6 +471,7 @@ def test_number_fields_accept_no_space() -> None:
         "parameters/edit_value.py": {"NumberInput"},
         "connection/line_form.py": {"NumberInput", "WordField"},
         "choosing.py": {"WordField"},
+        "dialogs/address.py": {"NumberInput"},
         "parameters/screen.py": {"WordField"},
         "dialogs/pick_parameter.py": {"WordField"},
         "frames/frame_list.py": {"WordField"},

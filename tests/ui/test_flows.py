@@ -17,6 +17,7 @@ from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.control.map_screen import MapScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
@@ -238,6 +239,7 @@ def test_every_action_has_a_method_and_a_text() -> None:
         MonitorScreen,
         FramesScreen,
         ControlSourceScreen,
+        MapScreen,
         FaultsScreen,
         ParametersScreen,
         BlocksScreen,

@@ -76,6 +76,7 @@ def test_line_without_a_motor_is_sent_no_stop() -> None:
     assert stops.lines() == []
 
 
+@pytest.mark.internal_errors
 def test_work_that_cannot_be_ended_and_a_watch_that_fails_prevent_no_stop() -> None:
     fleet = Fleet(1, 2, fails="work1 watch")
     stops = stops_of(fleet)
@@ -83,6 +84,7 @@ def test_work_that_cannot_be_ended_and_a_watch_that_fails_prevent_no_stop() -> N
     assert fleet.did == [("work", 1, BY), ("work", 2, BY), ("stop", 1, BY)]
 
 
+@pytest.mark.internal_errors
 def test_error_of_one_motor_prevents_no_stop_of_the_others() -> None:
     fleet = Fleet(1, 2, 3, started=(2, 3), fails="stop2")
     stops = stops_of(fleet)
@@ -99,6 +101,7 @@ def test_error_of_one_motor_prevents_no_stop_of_the_others() -> None:
     assert stops.troubles == {}, "the second attempt was sent"
 
 
+@pytest.mark.internal_errors
 def test_prepared_frames_need_the_console_of_the_drive() -> None:
     fleet = Fleet(1, 2, fails="stop")
     fleet.console = cast(Any, lambda device: None)
@@ -131,6 +134,7 @@ def test_wait_is_true_if_every_motor_was_read_at_standstill(
     assert stops.followed
 
 
+@pytest.mark.internal_errors
 def test_wait_that_fails_leaves_it_unknown_if_the_motor_stopped() -> None:
     fleet = Fleet(1, fails="wait")
     stops = stops_of(fleet)

@@ -54,7 +54,7 @@ REGISTERED = (
             *key_rows(("prove", "P", "test", PROVE)),
             Action("write_chosen", "enter", "write", WRITE_SOURCE, bound=False),
             *key_rows(("other_page", "tab", "map", "Show the communication map.")),
-            *key_rows(("leave", "escape", "back", "Go back to Monitor.")),
+            *key_rows(("leave", "escape", "", "Go back to Monitor.")),
         ),
     ),
     Registration(
@@ -65,9 +65,9 @@ REGISTERED = (
             *key_rows(
                 ("turn_format(1)", "right", "format", "Show the word in the next format."),
                 ("turn_format(-1)", "left", "", "Show the word in the previous format."),
-                ("clear_word", "delete", "clear", "Clear the word under the cursor."),
-                ("other_page", "tab", "switches", "Go back to the switches."),
-                ("leave", "escape", "back", "Go back to Control."),
+                ("clear_word", "delete", "", "Clear the word under the cursor."),
+                ("other_page", "tab", "back", "Go back to the switches."),
+                ("leave", "escape", "", "Go back to Control."),
             ),
         ),
     ),
