@@ -23,22 +23,16 @@ MONITOR = (
     RUNNING.pattern,
     r"1 Line .* 7 Frames",
     r"Output .*Current",
-    r"Command    Modbus",
-    r"Fed +\d",
+    r"Command +Modbus",
+    r"Timeout +(off|\d)",
+    r"Answers +\d",
     r"Speed +\d+ rpm",
-    r"Motor voltage +\d+ V",
-    r"Motor thermal +\d+ %",
     r"Torque +-?\d",
-    r"Mains +\d",
-    r"Energy +\d+ kWh",
-    r"Power +-?\d",
-    r"Drive thermal +\d",
-    r"Run time +\d+ h",
-    r"at reference",
-    r"ETA +16#\w{4}",
-    r"ETI +16#\w{4}",
-    r"Alarms +none",
-    r"Space STOP .* a arm .* q leave",
+    r"Power +\d",
+    r"Motor +\d+ V",
+    r"ETA +16#",
+    r"Alarms  ",
+    r"Space STOP 1 .* q quit",
 )
 """All of Monitor at 80 x 24: strip, tabs, values, words of bits, the line of keys."""
 
@@ -96,8 +90,8 @@ def htop_turned(before: str, now: str) -> bool:
 
 
 _MONITOR_SHOWN = both(saying_all(*MONITOR), saying_none("Frames on the line", "Messages ─"))
-_MONITOR_GONE = saying_none("Motor voltage", "Heard ", "Alarms  ")
-_FRAMES_SHOWN = both(saying_all("Frames on the line", r"h hold .* q leave"), _MONITOR_GONE)
+_MONITOR_GONE = saying_none("Answers  ", "Alarms  ")
+_FRAMES_SHOWN = both(saying_all("Frames on the line", r"h pause .* q quit"), _MONITOR_GONE)
 _MESSAGES_SHOWN = both(saying_all("Messages ─", r"Esc back .* q quit"), _MONITOR_GONE)
 PANEL_KEYS = (
     Press("Tab", "\t", word_sign),

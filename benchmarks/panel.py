@@ -44,7 +44,7 @@ AS_MUCH = {(80, 24): (1, 6), (120, 40): (4, 17)}
 """Texts and lines that Tab changes on Monitor, by the size of the terminal."""
 FIRST_WORDS = (
     "Drive Panel",
-    "Lines ─",
+    "Lines",
     "Simulated",
     "No line ─",
     "hoose a line and press",

@@ -30,6 +30,7 @@ SMALL = {
     "keeper": "--rounds 1 --seconds 2",
     "keys": "",
     "line": "--families atv31 --bauds 19200 --seconds 0.2",
+    "line_keys": "--drives 5 --presses 5 --seconds 1",
     "record": "--seconds 0.3 --hours 0.02 --drives 3",
     "scan": "--addresses 4 --rounds 1",
     "share_soak": "--minutes 0.1",

@@ -52,7 +52,7 @@ def test_stop_keys_of_every_terminal_only_stop(panel: PtyPanel, dialect: str, nu
         assert "only drive" not in panel.text()
         if pieces[0] == "\x1b" and gap > ESCAPE_DELAY:
             # an ESC that nothing followed in time is the key Escape
-            panel.shows("Lines ─")
+            panel.shows("Lines  ●")
             panel.type("2")
         panel.shows("Output", "a arm")
 

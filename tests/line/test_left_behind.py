@@ -223,7 +223,7 @@ def test_each_screen_shows_a_motor_that_no_program_commands(
 
     shows("Space stops it, T takes it over.", "Open it, then press Space")
     terminal.press("6")
-    terminal.wait_for("Signal path of the selected configuration")
+    terminal.wait_for("REFERENCE")
     shows("Press Space to stop it, or T on Monitor to take it over.")
     terminal.press("m")
     shows("Drive 1: Running since", "Open it, then press Space to stop it or T to take it over.")
