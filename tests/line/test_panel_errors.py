@@ -37,6 +37,7 @@ DIALOGS = {
     "Confirm": "dialogs.confirm",
     "Leave": "dialogs.leave",
     "Palette": "choosing",
+    "AddressField": "dialogs.address",
     "PickFile": "dialogs.pick_file",
     "WhyScreen": "why",
     "HelpScreen": "keys.help",
