@@ -22,7 +22,7 @@ CHANGES = {
 ROOMS = ("bus", "keeper", "session")
 """Classes used by several threads: that of the line, those of drives, that of the screen."""
 
-OBJECTS = {"events", "journal", "_file", "_files", "_trace"}
+OBJECTS = {"events", "journal", "trace", "_file", "_files", "_trace"}
 """Not collections although they have such methods: logs with their own locks, files, frames."""
 WITHOUT_LOCK = {
     "ByteOrder.forget": ("_tested _was_away", "flags, each set in one step"),
@@ -37,6 +37,29 @@ WITHOUT_LOCK = {
         "_families _port_listener _stack _thread link",
         "before its thread begins",
     ),
+    "LineRecorder._fail": (
+        "_failed _failing_since _reported _retry_at _why",
+        "only its own thread sets them",
+    ),
+    "LineRecorder._file": ("_standing", "only its own thread uses it"),
+    "LineRecorder._jumps": ("_offset", "only its own thread uses it"),
+    "LineRecorder._look_after": ("_flushed _reduced _roomed", "only its own thread uses them"),
+    "LineRecorder._make_room": ("_roomed", "only its own thread uses it"),
+    "LineRecorder._recover": (
+        "_failing_since _waiting _why",
+        "set by its own thread; a deque, changed in one step",
+    ),
+    "LineRecorder._reduce": ("_reduced", "only its own thread uses it"),
+    "LineRecorder._rows": ("_standing", "only its own thread uses it"),
+    "LineRecorder._settle": ("_lost_then _reported", "only its own thread uses them"),
+    "LineRecorder._work": ("_off _waiting", "set once; a deque, emptied in one step"),
+    "LineRecorder._write_waiting": (
+        "_batch _waiting",
+        "used by its own thread; a deque, changed in one step",
+    ),
+    "LineRecorder.close": ("_closed", "set once"),
+    "LineRecorder.note": ("_waiting", "a deque, changed in one step"),
+    "LineRecorder.waiting": ("_waiting", "read in one step"),
     "LineWatch._glance": ("_looks", "replaced as a whole"),
     "LineWatch.stop": ("_looks", "replaced as a whole"),
     "OrphanMotorGuard._ended_by_loss": ("_lost", "only its own thread uses it"),

@@ -472,12 +472,17 @@ def test_dispatcher_looks_again_after_each_change() -> None:
     assert woken()
     assert here.take_all() == [job]
     strays: list[object] = []
-    cast(Any, here)._outcomes = SimpleNamespace(note_stray=lambda *those: strays.append(those))
+    recorded: list[Any] = []
+    cast(Any, here)._outcomes = SimpleNamespace(
+        note_stray=lambda *those: strays.append(those), record=lambda *those: recorded.append(those)
+    )
     cast(Any, here).steps = SimpleNamespace(stray=strays.append)
     piece = Piece(b"a frame", whole=True)
     here.stray(piece, 99.0)
     assert woken()
     assert strays == [(piece, 99.0), piece]
+    [(device, sent, result)] = recorded
+    assert (device, sent, result.strays) == (piece.device, b"", [piece])
     here.wake()
     assert woken()
 

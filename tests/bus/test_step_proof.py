@@ -232,6 +232,7 @@ class Doubts:
         self.late: list[tuple[object, ...]] = []
         self.noted: list[tuple[ResultKind | None, bool]] = []
         self.counted: list[tuple[int, object]] = []
+        self.recorded: list[tuple[object, ...]] = []
         self.echo = echo
         self._answers = list(answers)
         devices = SimpleNamespace(
@@ -243,7 +244,10 @@ class Doubts:
                 (result and result.kind, number)
             )
         )
-        outcomes = SimpleNamespace(count_beside=lambda *those: self.counted.append(those))
+        outcomes = SimpleNamespace(
+            count_beside=lambda *those: self.counted.append(those),
+            record=lambda *those: self.recorded.append(those),
+        )
         self.proof = StepProof(
             cast(Any, devices), cast(Any, outcomes), lambda: self.now, self.repeats.append,
             cast(Any, steps),

@@ -34,9 +34,15 @@ OWN_TIME = {
     "api/running_motor.py",
     "running/motor_run.py",
     "running/watching.py",
+    "record/record_file.py",
+    "record/recorder.py",
+    "record/ring.py",
+    "connect/recorded_line.py",
+    "recording/recording_file.py",
+    "sharing/stop_others.py",
 }
-"""Modules that use the real clock: the thread of the journal, threads that wait for a stop, and
-programs that wait for the motor that they run.
+"""Modules that use the real clock: the threads of the journal and of the recorder, times that are
+recorded, threads that wait for a stop, and programs that wait for the motor that they run.
 """
 SESSION = Path(tui.session.__file__).parent
 

@@ -290,7 +290,7 @@ def test_keeper_has_its_line_shared_gated_and_under_its_lock(
     assert alarms == [(signal.ITIMER_REAL, 2.0)]
 
 
-def test_keeper_opens_its_line_and_closes_it_before_its_guard_and_journal() -> None:
+def test_keeper_opens_its_line_and_closes_it_before_its_guard_journal_and_recorder() -> None:
     bench, did = Bench(), []
 
     def part(name: str, does: str) -> SimpleNamespace:
@@ -300,6 +300,14 @@ def test_keeper_opens_its_line_and_closes_it_before_its_guard_and_journal() -> N
     line = part("line", "open")
     line.close = part("line", "close").close
     bench.keeper._line = line
+    bench.keeper._recorder = part("recorder", "close")
     bench.keeper._until_unneeded = lambda: did.append("waits")
     bench.keeper.work()
-    assert did == ["open line", "waits", "close line", "close guard", "close journal"]
+    assert did == [
+        "open line",
+        "waits",
+        "close line",
+        "close guard",
+        "close journal",
+        "close recorder",
+    ]

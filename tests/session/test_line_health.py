@@ -70,7 +70,7 @@ def test_begin_and_end_of_trouble_are_reported_once() -> None:
     assert (kind, text.split(".")[0]) == ("alarm", "7 foreign frames in the last minute")
     assert health.look(counted(LastMinute(good=600))) == [
         (
-            "told",
+            "done",
             "The line is healthy again: 100 % of the replies were good in the last minute.",
         )
     ]

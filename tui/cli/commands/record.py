@@ -19,6 +19,7 @@ from ..documents.document import Document, DocumentPart
 from ..shared.completion import complete_line_or_code
 from ..shared.errors import INTERRUPTED, USAGE, Failure
 from ..shared.numbers import FiniteRange, check_rate
+from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
     connect_drive,
@@ -173,7 +174,11 @@ class RecordedDrive:
     help="Keep these seconds after a trigger.",
 )
 @click.option(
-    "--for", "seconds", type=FiniteRange(0), metavar="S", help="Stop recording after S seconds."
+    "--for",
+    "seconds",
+    type=seconds_range(above=True),
+    metavar="S",
+    help="Stop recording after S seconds.",
 )
 @click.option(
     "--count", type=click.IntRange(min=1), metavar="N", help="Stop recording after N triggers."

@@ -17,6 +17,7 @@ from itertools import takewhile
 from pathlib import Path
 
 import tui
+from tui.drive.small_file import read_small_text
 
 from ..stored import make_folder
 from .reduction import ReducedRow, ReductionWindow
@@ -320,6 +321,6 @@ def _as_os_errors(path: Path) -> Iterator[None]:
 def boot_id() -> str:
     """An id of the time since the computer was started; empty if the system has none."""
     try:
-        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+        return read_small_text(Path("/proc/sys/kernel/random/boot_id")).strip()
     except OSError:
         return ""

@@ -103,7 +103,7 @@ class LineRecorder:
         self._batch: list[ReplyRow | EventRow] = []
         self._lost = self._lost_reported = 0
         self._lost_since: tuple[float, float] | None = None
-        self._lost_lock = threading.Lock()
+        self._lock = threading.Lock()
         self._files: dict[Path, RecordFile] = {}
         self._standing: dict[tuple[str, int | None], EventRow] = {}
         """The last events that each file begins with, by kind and device."""
@@ -162,20 +162,21 @@ class LineRecorder:
     def _lose(self, rows: int) -> None:
         if not rows:
             return
-        with self._lost_lock:
+        with self._lock:
             self._lost += rows
             if self._lost_since is None:
                 self._lost_since = time.time(), time.monotonic()
 
     def _begin(self) -> None:
-        if self._closed:
-            return
-        self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
-        try:
-            self._thread.start()
-        except RuntimeError as error:
-            self._thread = None  # no thread to be had: the next row tries again
-            log.error("the recorder has no thread: %s", error)
+        with self._lock:  # a prepared stop may be sent by another thread
+            if self._closed or self._thread is not None:
+                return
+            self._thread = threading.Thread(target=self._work, name="recorder", daemon=True)
+            try:
+                self._thread.start()
+            except RuntimeError as error:
+                self._thread = None  # no thread to be had: the next row tries again
+                log.error("the recorder has no thread: %s", error)
 
     # The recorder's thread
 
@@ -327,7 +328,7 @@ class LineRecorder:
     def _recover(self) -> None:
         """Record what was lost until now."""
         why, self._why, self._failing_since = self._why, "", 0.0
-        with self._lost_lock:
+        with self._lock:
             lost, since = self._lost - self._lost_reported, self._lost_since
             self._lost_reported, self._lost_since = self._lost, None
         text = counted(lost, "1 row was not recorded.", "{count} rows were not recorded.")
