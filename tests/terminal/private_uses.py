@@ -64,9 +64,10 @@ def names_of_any() -> frozenset[str]:
     from textual.strip import Strip
     from textual.timer import Timer
     from textual.widgets import Input, OptionList, Static, TextArea
+    from textual.widgets.option_list import Option
 
     kinds = [App, ModalScreen, Static, Input, OptionList, TextArea, Compositor, Console]
-    kinds += [Driver, LinuxDriver, Strip, Timer]
+    kinds += [Driver, LinuxDriver, Option, Strip, Timer]
     kinds += [kind for module in (events, messages) for kind in _classes_of(module)]
     return frozenset().union(
         *(private_names(base) for kind in kinds for base in textual_bases(kind))

@@ -304,6 +304,39 @@ def _last_words_are_printed_at_the_end() -> bool:
     return ends.index("events.Unmount()") < ends.index("self._print_error_renderables()")
 
 
+def _options_are_laid_out_in_one_place() -> bool:
+    from textual.widget import Widget
+    from textual.widgets import OptionList
+
+    lays_out = inspect.getsource(OptionList._update_lines)
+    cache = OptionList()._line_cache
+    return (
+        (cache.lines, cache.heights, cache.index_to_line) == ([], {}, {})
+        and "self.virtual_size = virtual_size" in lays_out
+        and "self._scroll_update(virtual_size)" in lays_out
+        and list(inspect.signature(Widget._scroll_update).parameters) == ["self", "virtual_size"]
+        and all(
+            "self._update_lines()" in inspect.getsource(function)
+            for function in (OptionList.add_options, OptionList.clear_options)
+        )
+    )
+
+
+def _drawn_options_are_dropped_in_one_place() -> bool:
+    from textual.widgets import OptionList
+
+    drops = inspect.getsource(OptionList._clear_caches)
+    return "self._option_render_cache.clear()" in drops and "self._line_cache.clear()" in drops
+
+
+def _prompt_is_set_without_drawing() -> bool:
+    from textual.widgets.option_list import Option
+
+    option = Option("before")
+    option._set_prompt("after")
+    return option.prompt == "after" and "refresh" not in inspect.getsource(Option._set_prompt)
+
+
 PARTS = [
     Part(
         "textual._ansi_sequences.ANSI_SEQUENCES_KEYS",
@@ -484,6 +517,24 @@ PARTS = [
         "last_words.py",
         "LastWords: what App prints once the screen is left",
         _last_words_are_printed_at_the_end,
+    ),
+    Part(
+        "OptionList._update_lines._line_cache._scroll_update",
+        "rows.py",
+        "EvenList: how Textual gives each option its rows, and when",
+        _options_are_laid_out_in_one_place,
+    ),
+    Part(
+        "OptionList._clear_caches",
+        "rows.py",
+        "EvenList: when Textual drops the options that it drew",
+        _drawn_options_are_dropped_in_one_place,
+    ),
+    Part(
+        "Option._set_prompt",
+        "rows.py",
+        "EvenList.set_prompt: how an option gets another prompt",
+        _prompt_is_set_without_drawing,
     ),
 ]
 

@@ -8,12 +8,13 @@ from typing import Self
 from rich.style import Style
 from rich.text import Text
 from textual.events import Resize
-from textual.geometry import Region, Size
+from textual.geometry import Region
 from textual.reactive import reactive
 from textual.strip import Strip
 from textual.visual import VisualType
 from textual.widgets import OptionList
 
+from tui.terminal.rows import EvenList
 from tui.widgets.lines import strip_of
 from tui.widgets.plain import entry, signs
 
@@ -22,7 +23,7 @@ CURSOR_SIGN = "▸"
 UNDER_CURSOR = "option-list--option-highlighted"
 
 
-class DriveList(OptionList):
+class DriveList(EvenList):
     """Drives that answered, each in the same number of rows.
 
     A changed state or a moved cursor draws only the rows of the drives that it concerns. The
@@ -49,12 +50,10 @@ class DriveList(OptionList):
         """
         self._moved, self._resized = moved, resized
         self._width = 0
-        self._each = 1
-        """Rows of each drive."""
         self._strips: dict[tuple[int, int, bool], Strip] = {}
         """Drawn rows by index, row of the drive, and True under the cursor."""
         self._under: dict[bool, Style] = {}
-        super().__init__(id=id, compact=True)
+        super().__init__(id=id)
         self._drawn: dict[int, Text] = {}
 
     @property
@@ -79,7 +78,7 @@ class DriveList(OptionList):
             wanted = [*stay, *(device for device in wanted if device not in self._drawn)]
         before, self._drawn = self._drawn, {device: lines[device] for device in wanted}
         each = max((text.plain.count("\n") + 1 for text in lines.values()), default=1)
-        if wanted == list(before) and each == self._each:
+        if wanted == list(before) and each == self.rows_each:
             for device in wanted:
                 if lines[device] is not before[device] and (
                     lines[device] != before[device] or lines[device].spans != before[device].spans
@@ -87,7 +86,7 @@ class DriveList(OptionList):
                     self.replace_option_prompt(str(device), lines[device])
             return
         chosen, top = self.chosen, self.scroll_offset.y
-        resized, self._each = each != self._each, each
+        resized, self.rows_each = each != self.rows_each, each
         self.clear_options()
         self.add_options(entry(lines[device], id=str(device)) for device in wanted)
         if chosen is not None and chosen in lines:
@@ -115,21 +114,21 @@ class DriveList(OptionList):
         """Draw a changed drive again."""
         index = self.get_option_index(option_id)
         shown = signs(prompt) if isinstance(prompt, Text) else prompt
-        self.get_option_at_index(index)._set_prompt(shown)
-        for row in range(self._each):
+        self.set_prompt(index, shown)
+        for row in range(self.rows_each):
             self._strips.pop((index, row, False), None)
             self._strips.pop((index, row, True), None)
         self._refresh_drive(index)
         return self
 
     def _refresh_drive(self, index: int | None) -> None:
-        top = (index or 0) * self._each - self.scroll_offset.y
-        if index is not None and top + self._each > 0 and top < self.size.height:
-            self.refresh(Region(0, top, self.size.width, self._each))
+        top = (index or 0) * self.rows_each - self.scroll_offset.y
+        if index is not None and top + self.rows_each > 0 and top < self.size.height:
+            self.refresh(Region(0, top, self.size.width, self.rows_each))
 
-    def _clear_caches(self) -> None:
+    def forget_rows(self) -> None:
+        """Draw every row again when Textual would."""
         self._strips.clear()
-        super()._clear_caches()
 
     def on_resize(self, event: Resize) -> None:
         """Request rows for another width; the first ones are made for the present width."""
@@ -143,23 +142,9 @@ class DriveList(OptionList):
         self._under.clear()
         super().notify_style_update()
 
-    def _update_lines(self) -> None:
-        """Give each drive its rows; Textual would measure each of them."""
-        if not self.scrollable_content_region:
-            return
-        cache, each = self._line_cache, self._each
-        for index in range(len(cache.heights), len(self.options)):
-            cache.index_to_line[index] = index * each
-            cache.heights[index] = each
-            cache.lines.extend((index, row) for row in range(each))
-        size = Size(self.scrollable_content_region.width, len(cache.lines))
-        if size != self.virtual_size:
-            self.virtual_size = size
-            self._scroll_update(size)
-
     def render_lines(self, crop: Region) -> list[Strip]:
         """Draw the rows of a region; without a border, most of Textual's work is skipped."""
-        self._update_lines()
+        self.lay_out()
         if self.size != self.outer_size:
             return super().render_lines(crop)
         strips = [self.render_line(y) for y in crop.line_range]
@@ -173,7 +158,7 @@ class DriveList(OptionList):
     def render_line(self, y: int) -> Strip:
         """Draw one row of a drive."""
         width = self.scrollable_content_region.width
-        index, row = divmod(self.scroll_offset.y + y, self._each)
+        index, row = divmod(self.scroll_offset.y + y, self.rows_each)
         if index >= len(self.options):
             return Strip.blank(width, self._style_under(chosen=False))
         key = index, row, index == self.highlighted
