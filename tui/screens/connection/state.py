@@ -16,7 +16,6 @@ from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
 from tui.session.connect.named_lines import line_settings
-from tui.widgets.curve import curve_signs
 from tui.widgets.drawing import pair, rule
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, KEY, PLAIN, STRONG
@@ -32,12 +31,13 @@ from .line_list import LineList
 from .progress import far_text, left_text, scan_forms
 from .rows import TRUSTED_LOOKS, rows_of
 from .wall import WallColumns, WallRow, column_heads, columns_for, heading, wall_line
-from .wall_curves import CurveCells, WallCurves
 
 if TYPE_CHECKING:
     from tui.session.connect.search import Search
     from tui.session.fleet import Fleet, FoundDrive
     from tui.session.monitor.look import Look
+
+    from .wall_curves import WallCurves
 
 log = logging.getLogger(__name__)
 
@@ -85,7 +85,7 @@ class LineView(PanelScreen):
         self._away = self._was_lost = False
         self._typed_at = -math.inf
         """Time of the last key press, in seconds on the monotonic clock."""
-        self._curves = WallCurves()
+        self._curves: WallCurves | None = None
 
     def body(self) -> ComposeResult:
         """Yield the two columns, and the details of the chosen drive below."""
@@ -211,6 +211,13 @@ class LineView(PanelScreen):
         self, fleet: Fleet, columns: WallColumns, now: float, wall: float
     ) -> tuple[Mapping[int, tuple[str, ...]], float]:
         """Return the curves of the last minute by device, and the end of their scale in Hz."""
+        # imported late: speeds up the start
+        from tui.widgets.curve import curve_signs
+
+        from .wall_curves import CurveCells, WallCurves
+
+        if self._curves is None:
+            self._curves = WallCurves()
         signs = curve_signs(plain=self.app.plain_signs, braille=self.app.has_braille)
         reach = TRUSTED_LOOKS * fleet.line_watch.glance_period
         cells = CurveCells(columns.curve, columns.rows, signs)
