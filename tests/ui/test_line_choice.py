@@ -212,6 +212,19 @@ async def test_cursor_stays_on_its_drive_not_its_row() -> None:
         await pilot.pause()
 
 
+async def test_each_row_shows_the_drive_it_opens_after_others_appear_above() -> None:
+    app = fakes.app_of()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await app.push_screen(Listed())
+        listed = app.screen.query_one(DriveList)
+        listed.styles.height = 10  # as on Line: no new height that would draw all of it again
+        for devices in ((7,), (4, 7), (2, 4, 5, 7)):
+            listed.fill(*lines(*devices))
+            await pilot.pause()
+            shown = [listed.render_line(y).text.split() for y in range(len(devices))]
+            assert shown == [["drive", str(device)] for device in devices]
+
+
 class HandClock(fakes.StillClock):
     """A clock that advances by the test."""
 

@@ -88,6 +88,7 @@ class DriveList(EvenList):
         chosen, top = self.chosen, self.scroll_offset.y
         resized, self.rows_each = each != self.rows_each, each
         self.clear_options()
+        self.forget_rows()  # they are kept by index, which another drive may have now
         self.add_options(entry(lines[device], id=str(device)) for device in wanted)
         if chosen is not None and chosen in lines:
             with self.prevent(OptionList.OptionHighlighted):  # the user has chosen nothing
