@@ -240,13 +240,16 @@ class Engine:
             self.state = state
             self._error = error
             self._news.notify_all()
+        # an error here must not end the loop of the line: a stop may wait for it
         if self._shared is not None:
             try:
                 self._shared.tell_state()
             except Exception:
-                # it must not end the loop of the line: a stop may wait for it
                 log.exception("the line's state was not sent to the programs on it")
-        self.facts.events.emit(StateChanged(state))
+        try:
+            self.facts.events.emit(StateChanged(state))
+        except Exception:
+            log.exception("a change of the line was not passed on")
 
     def _work(self, loop: asyncio.AbstractEventLoop) -> None:
         """The thread: run the loop until closed, then leave nothing behind."""
