@@ -20,7 +20,6 @@ from tests.test_packages import build
 PAGE = ROOT / "docs" / "api.md"
 EXAMPLES = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
 WRONG = """
-from tests.sweeps import kept
 from tui.session.api import open_drives
 
 with open_drives("sim:atv71") as line:
