@@ -216,7 +216,7 @@ def draw_side(
 
 
 def drawing(paths: ControlPaths, speed: str, style: Style, width: int) -> list[Text]:
-    """Return both paths with the motor; `speed` is its frequency, in `style`."""
+    """Return both paths with the motor; `speed` is its frequency in Hz, in `style`."""
     canvas = Canvas(min(width, WIDEST_DRAWING), DRAWING_ROWS)
     join = canvas.width - MOTOR_WIDTH
     states = {carries: paths.state(carries) for carries in SIGNAL_TITLES}
@@ -245,7 +245,7 @@ def drawing(paths: ControlPaths, speed: str, style: Style, width: int) -> list[T
     for row, text in ((3, "╭──────╮"), (4, "│      │"), (5, "╰──────╯")):
         canvas.put(row, join + 2, text, LINE)
     canvas.put(4, join + 3, f"{short(speed, 6):^6}", style)
-    canvas.put(6, join + 3, "motor", FAINT)
+    canvas.put(6, join + 2, "motor Hz" if speed else " motor", FAINT)
     return canvas.lines()
 
 

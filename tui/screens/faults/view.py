@@ -75,12 +75,15 @@ def record_lines(record: FaultRecord | None, width: int, height: int, offset: in
             rule("Before the trip", width),
             Text(" No trip since monitoring of this drive began.", FAINT),
         ]
+    cycles = len(record.moments)
     title = counted(
         len(record.writes),
         "Before the trip: {cycles} cycles, 1 write by Drive Panel",
         "Before the trip: {cycles} cycles, {count} writes by Drive Panel",
-        cycles=len(record.moments),
+        cycles=cycles,
     )
+    if not record.writes:
+        title = f"Before the trip: {cycles} cycles"
     head = Text(f" {'s':>{FAULT_TIME_WIDTH - 1}}", FAINT, no_wrap=True)
     for heading in record.headings[: _columns(width)]:
         head.append(f"{heading[: RECORD_VALUE_WIDTH - 1]:>{RECORD_VALUE_WIDTH}}", FAINT)
