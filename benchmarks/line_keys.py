@@ -14,7 +14,6 @@ import json
 import os
 import re
 import socket
-import subprocess
 import tempfile
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
@@ -23,9 +22,8 @@ from pathlib import Path
 from rich.console import Console
 
 from benchmarks.hello import TEXTS
-from benchmarks.panel import HELLO, HELLO_TEXT, PANEL, SETTLED, Bench
+from benchmarks.panel import HELLO, HELLO_TEXT, PANEL, SETTLED, Bench, simulated
 from benchmarks.terminal import Figures, Key, Terminal, press_often, steady
-from benchmarks.wire import ROOT
 from tui.session.connect.line_key import line_key
 from tui.session.paths import remember_addresses
 
@@ -50,19 +48,9 @@ def simulated_drives(count: int) -> Iterator[str]:
     specs = [f"{FAMILIES[at % len(FAMILIES)]}@{at + 1}" for at in range(count)]
     with closing(socket.create_server(("127.0.0.1", 0))) as free:
         port = free.getsockname()[1]
-    process = subprocess.Popen(
-        (*PANEL, "simulate", *specs, "--tcp", f"127.0.0.1:{port}", "--run", "30"),
-        cwd=ROOT,
-        stdout=subprocess.PIPE,
-        text=True,
-    )
-    assert process.stdout is not None
-    try:
-        process.stdout.readline()
-        yield f"tcp:127.0.0.1:{port}"
-    finally:
-        process.terminate()
-        process.wait(10)
+    served = (*specs, "--tcp", f"127.0.0.1:{port}", "--run", "30")
+    with simulated(f"tcp:127.0.0.1:{port}", *served) as line:
+        yield line
 
 
 def found_all(terminal: Terminal, count: int) -> None:

@@ -19,7 +19,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing, contextmanager
+from contextlib import AbstractContextManager, closing, contextmanager
 from itertools import takewhile
 from pathlib import Path
 from typing import Any
@@ -351,11 +351,10 @@ def _cell(figures: Any, place: tuple[str, ...], form: str, factor: float) -> str
 
 
 @contextmanager
-def simulated_drive(folder: Path) -> Iterator[str]:
-    """A running drive on a line of its own, served by another process; gives the LINE."""
-    link = folder / "line"
+def simulated(line: str, *arguments: str) -> Iterator[str]:
+    """Drives that `simulate` serves with these arguments in another process; gives the LINE."""
     process = subprocess.Popen(
-        (*PANEL, "simulate", "atv71@1", "--pty", str(link), *SIMULATED),
+        (*PANEL, "simulate", *arguments),
         cwd=ROOT,
         stdout=subprocess.PIPE,
         text=True,
@@ -363,10 +362,16 @@ def simulated_drive(folder: Path) -> Iterator[str]:
     assert process.stdout is not None
     try:
         process.stdout.readline()
-        yield f"serial:{link},19200,8N1"
+        yield line
     finally:
         process.terminate()
         process.wait(10)
+
+
+def simulated_drive(folder: Path) -> AbstractContextManager[str]:
+    """A running drive on a line of its own; gives the LINE."""
+    link = folder / "line"
+    return simulated(f"serial:{link},19200,8N1", "atv71@1", "--pty", str(link), *SIMULATED)
 
 
 def main() -> None:
