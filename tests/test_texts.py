@@ -161,7 +161,7 @@ GLUED = {
         "tui/screens/keys/pages.py",
         "' or '.join((key_text(key) for key in action.keys.split(',')))",
     ): ("pages of the documentation, which tests read"),
-    ("tui/screens/monitor/words.py", "message[:1].upper()"): "a text of a bit alone is a label",
+    ("tui/drive/sentences.py", "text[:1].upper()"): "the one function for a capital first letter",
 }
 """By module and source of a glued text: the reason why it stays."""
 

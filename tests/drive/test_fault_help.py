@@ -151,7 +151,7 @@ def test_drive_overrides_the_general_advice() -> None:
     assert reset_ready(profile, {"ETI": 0x0004}) is True
     assert reset_ready(profile, {"ETI": 0xFFFB}) is False
     assert reset_ready(library.load("atv21"), {"FD01": 0xFFFF}) is None
-    assert "x has no effect" in reset_text(help_, None, "x").text
+    assert "a reset has no effect" in reset_text(help_, None, "a reset").text
     assert "works now" in reset_text(help_, True, "x").text
     assert reset_text(help_, False, "x").text.startswith("Not yet")
 

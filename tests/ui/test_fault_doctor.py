@@ -10,11 +10,12 @@ import pytest
 from tests.ui.fakes import NOW, readings_of
 from tui.drive.hints import reset_text
 from tui.drive.profile import library
+from tui.drive.sentences import capitalized
 from tui.screens.faults.cause_rows import EXCLUDED, LIKELIEST, OPEN
 from tui.screens.faults.doctor import TOO_FEW, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
 from tui.screens.faults.history import history_rows
-from tui.screens.faults.next_steps import ARM
+from tui.screens.faults.next_steps import ARM, BESIDE_KEY
 from tui.screens.faults.parts import LABEL
 from tui.screens.faults.screen import FaultsScreen
 from tui.session.drive import DriveSession
@@ -66,7 +67,11 @@ def test_every_fault_fits_80_columns(family: str) -> None:
             continue
         shown = view(None, profile=profile, fault=fault)
         text = reported(shown, 80, 50)
-        for part in (*help_.probable, *help_.check, *(look.why for look in help_.look_at)):
+        for part in (
+            *help_.probable,
+            *help_.check,
+            *(capitalized(look.why) for look in help_.look_at),
+        ):
             assert part in text, (fault.code, part)
         assert "…" not in text.partition("Why")[2], fault.code
         assert all(line.cell_len <= 80 for line in doctor_lines(shown, 80, 50))
@@ -84,7 +89,7 @@ def test_page_fits_its_place_and_keeps_the_likeliest_cause(width: int, height: i
         if height >= 12:
             text = "\n".join(line.plain for line in lines)
             assert f"{LIKELIEST} The braking is too sudden for the inertia" in text
-            assert "x works now" in text
+            assert "A reset works now" in text
         if height >= 12 and cursor is not None and cursor < len(shown.rows):
             assert f"\n  {shown.rows[cursor].code} " in text
 
@@ -106,7 +111,7 @@ def test_general_practice_is_marked() -> None:
 
 
 def test_drive_reports_if_a_reset_is_possible() -> None:
-    for raw, output in ((0x0004, "x works now"), (0, "Not yet: the drive reports")):
+    for raw, output in ((0x0004, "A reset works now"), (0, "Not yet: the drive reports")):
         text = reset_shown(reported(view(9, readings=readings_of(ATV71, {"ETI": raw}, NOW))))
         assert output in text
         assert "practice" not in text
@@ -114,16 +119,16 @@ def test_drive_reports_if_a_reset_is_possible() -> None:
         code: reading.aged(NOW + 60, 6.0)
         for code, reading in readings_of(ATV71, {"ETI": 4}, NOW).items()
     }
-    assert "x has no effect" in reset_shown(reported(view(9, readings=old)))
+    assert "a reset has no effect" in reset_shown(reported(view(9, readings=old)))
 
 
 def test_next_key_says_what_a_reset_needs() -> None:
     read = readings_of(ATV71, {"ETI": 4}, NOW)
-    assert reset_shown(reported(view(9, readings=read))).startswith(f"{ARM} x works now")
+    assert reset_shown(reported(view(9, readings=read))).startswith(f"{ARM} A reset works now")
     armed = reset_shown(reported(view(9, readings=read, armed=True)))
-    assert armed.startswith("x works now")
+    assert armed.startswith("A reset works now")
     barred = reset_shown(reported(view(9, readings=read, barred="The line is read-only.")))
-    assert barred.startswith("Not possible now: The line is read-only. x works now")
+    assert barred.startswith("Not allowed here: The line is read-only. A reset works now")
     atv21 = library.load("atv21")
     wait = reset_shown(reported(view(None, profile=atv21, fault=atv21.fault(14))))
     assert "Wait about 120 s before it." in wait
@@ -141,7 +146,9 @@ def test_reset_text_is_never_cut_off(raw: int, width: int, height: int) -> None:
         if TOO_FEW in text:
             assert height < 9, text
             continue
-        assert reset_text(shown.help, shown.ready, "x", shown.follows).text in reset_shown(text)
+        assert capitalized(
+            reset_text(shown.help, shown.ready, BESIDE_KEY, shown.follows).text
+        ) in reset_shown(text)
 
 
 def test_input_that_caused_the_trip_fits_80_columns() -> None:
@@ -149,7 +156,7 @@ def test_input_that_caused_the_trip_fits_80_columns() -> None:
     external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
     read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
     rows = sections(reported(view(external.raw, readings=read)))["Values"]
-    assert "input or bit that trips it" in rows[1]
+    assert "Input or bit that trips it" in rows[1]
     assert rows[1].endswith(" Logic input LI4")
     assert next(row for row in rows if "IL1R" in row).endswith(" LI3, LI4")
     still = reported(view(external.raw, readings=readings_of(ATV71, {"IL1R": 0}, NOW)))

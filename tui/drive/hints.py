@@ -28,11 +28,11 @@ TRUST: Mapping[HelpConfidence, str] = {
 }
 """Text for the certainty of the first cause."""
 RESETS: Mapping[ResetWay | None, str] = {
-    "by-reset": "{by} once the cause is removed.",
-    "automatic": "{by} once the cause is removed, or the automatic restart if it is on.",
+    "by-reset": "{by} works once the cause is removed.",
+    "automatic": "{by} works once the cause is removed, or the automatic restart if it is on.",
     "by-itself": "The drive leaves the fault once the cause is removed, and may start.",
     "power-cycle": "Switch the drive off and on once the cause is removed; {by} has no effect.",
-    None: "{by} once the cause is removed.",
+    None: "{by} works once the cause is removed.",
 }
 RESET_NOW = "{by} works now, as the drive reports."
 RESET_NOT_YET = "Not yet: the drive reports that the cause is still present."
@@ -97,7 +97,7 @@ class ResetText:
 def reset_text(
     help_: FaultHelp | None, ready: bool | None, by: str, follows: str = MAY_START
 ) -> ResetText:
-    """Return how a fault is reset; `by` names the key or the command.
+    """Return how a fault is reset; `by` names the reset, such as `a reset`.
 
     `ready` is True or False as the drive reports it, None if it does not. That report takes
     precedence over the help, which is recalled from memory. `follows` is the motor's reaction, from

@@ -21,6 +21,11 @@ def sentence(text: str) -> str:
     return f"{text.rstrip('.')}."
 
 
+def capitalized(text: str) -> str:
+    """Return a text of a profile with a capital first letter, to begin a row or a sentence."""
+    return text[:1].upper() + text[1:]
+
+
 def all_of(names: Sequence[str]) -> str:
     """Return names as one part of a sentence, with `and` before the last."""
     *first, last = names or ("none",)

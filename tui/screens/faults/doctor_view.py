@@ -10,6 +10,7 @@ from tui.drive.fault_reset import reset_follows
 from tui.drive.hints import FaultAdvice, advice, reset_ready
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import AlarmHelp, FaultCode, FaultHelp, Hint, Quantity
+from tui.drive.sentences import capitalized
 from tui.session.monitor.alarms import PresentFault
 from tui.session.monitor.fault_record import FaultRecord
 from tui.session.monitor.watched import Watched
@@ -142,7 +143,10 @@ class DoctorView:
             if source
         }
         looks = self.hint.look_at if self.hint is not None else ()
-        rows = [ValueRow(look.code, live.get(look.code, look.code), look.why) for look in looks]
+        rows = [
+            ValueRow(look.code, live.get(look.code, look.code), capitalized(look.why))
+            for look in looks
+        ]
         named = {row.live for row in rows}
         found = (self.profile.quantity(quantity) for quantity in FAULT_QUANTITIES)
         others = [

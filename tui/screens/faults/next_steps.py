@@ -9,6 +9,7 @@ from rich.text import Text
 
 from tui.drive.hints import reset_text
 from tui.drive.profile.schema import Parameter
+from tui.drive.sentences import capitalized
 from tui.drive.settings.factory import factory_is_sure, factory_value
 from tui.widgets.drawing import cut, cut_at_word, rule, wrapped
 from tui.widgets.palette import ATTENTION, FAINT, KEY, PLAIN
@@ -18,6 +19,8 @@ from .parts import TRUST_MARKS, reading_text
 
 STEP_WIDTH = 9
 """Columns of the key, or of the name of a step."""
+BESIDE_KEY = "a reset"
+"""The reset in a sentence; the key is beside it."""
 ARM = "Press a to arm, then x."
 
 
@@ -98,12 +101,12 @@ def reset_rows(view: DoctorView, width: int) -> list[Text]:
     """Return what a reset needs and does, whole: it warns if the motor may start."""
     if not view.present:
         return []
-    message = reset_text(view.help, view.ready, "x", view.follows)
-    text = message.text
+    message = reset_text(view.help, view.ready, BESIDE_KEY, view.follows)
+    text = capitalized(message.text)
     if view.help is not None and message.wait:
         text = f"{text} Wait about {view.help.wait_s} s before it."
     if view.barred:
-        text = f"Not possible now: {view.barred} {text}"
+        text = f"Not allowed here: {view.barred} {text}"
     elif not view.armed:
         text = f"{ARM} {text}"
     if not message.by_drive:

@@ -11,6 +11,7 @@ from rich.text import Text
 
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Bit, Parameter
+from tui.drive.sentences import capitalized
 from tui.drive.values import NOT_AVAILABLE
 from tui.widgets.drawing import cut, rule
 from tui.widgets.palette import ALARM, BAR, FAINT, KEY, LINE, PLAIN, STRONG
@@ -268,7 +269,7 @@ def _bit_words(bit: Bit, on: bool, room: int) -> str:
     plain = message.casefold() in PLAIN_ANSWERS
     if not _denied_at_1(bit) and (plain or (on and message.casefold() in bit.name.casefold())):
         return bit.name
-    alone = message[:1].upper() + message[1:]
+    alone = capitalized(message)
     if bit.name.casefold() in message.casefold():
         return alone
     both = f"{bit.name}: {message}"
