@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 
@@ -14,10 +15,11 @@ from rich.text import Text
 
 from tui.drive.profile import library
 from tui.screens.monitor.arrange import arrange
-from tui.screens.monitor.curves import MARK_SIGNS, clock_text, curve_lines
+from tui.screens.monitor.curves import clock_text, curve_lines
+from tui.screens.monitor.time_axis import MARK_SIGNS
 from tui.screens.monitor.time_cursor import TimeCursor
 from tui.screens.monitor.view import View
-from tui.session.monitor.trend import TREND_MARKS, TrendPoint
+from tui.session.monitor.trend import TREND_MARKS, TrendMark, TrendPoint
 from tui.widgets.curve import (
     ASCII_SIGNS,
     BLOCKS,
@@ -225,26 +227,66 @@ def test_old_values_are_not_shown_as_the_present_one() -> None:
         assert "─50.0" not in "\n".join(line.plain for line in curve_lines(view, room))
 
 
-def test_marks_are_at_their_time_and_explained_only_if_they_occur() -> None:
-    room, base = arrange(120, 40, 9), running_view(1000.0)
-    base = replace(base, apart=0.0)
-    heading = curve_lines(base, room)[0].plain
+def marked_at(view: View, marks: Mapping[float, str]) -> View:
+    """The view with marks at some times; its clock is that of the axis."""
+    points = tuple(replace(p, mark=marks.get(p.time, "")) for p in view.trend)
+    return replace(view, trend=points, apart=0.0)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+def test_marks_are_at_their_time_and_explained_only_if_they_occur(size: tuple[int, int]) -> None:
+    room, base = arrange(*size, 9), running_view(1000.0)
+    assert room.plot >= (9 if size == (80, 24) else 16)
+    columns = size[0] - 6 - 7
     for mark in TREND_MARKS:
         sign, _, name = MARK_SIGNS[mark]
-        assert sign not in heading
-        points = tuple(replace(p, mark=mark if p.time == 990.0 else "") for p in base.trend)
-        lines = curve_lines(replace(base, trend=points), room)
-        assert f"{sign} {name}" in lines[0].plain
-        columns = 120 - 6 - 7
-        axis = lines[1 + room.plot + 1 + room.band].plain
-        assert axis.index(sign) == 6 + int((990.0 - page_start(1000.0, base.step)) / 60 * columns)
+        nothing = "\n".join(line.plain for line in curve_lines(marked_at(base, {}), room))
+        assert sign not in nothing
+        heading, *_, axis, _ = (
+            line.plain for line in curve_lines(marked_at(base, {970.0: mark}), room)
+        )
+        assert axis.index(f"{sign} {name} ") == 6 + int(
+            (970.0 - page_start(1000.0, base.step)) / 60 * columns
+        )
+        assert name not in heading.replace("reference", "", 1), "explained once"
+
+
+@given(
+    st.dictionaries(st.integers(0, 90), st.sampled_from(TREND_MARKS), min_size=1, max_size=12),
+    st.sampled_from([(60, 16), (80, 24), (120, 40)]),
+)
+def test_name_of_a_mark_is_beside_its_own_sign_and_covers_no_other(
+    marks: dict[int, TrendMark], size: tuple[int, int]
+) -> None:
+    room = arrange(*size, 9)
+    view = marked_at(running_view(1000.0), {1000.0 - at / 2: mark for at, mark in marks.items()})
+    axis = curve_lines(view, room)[-room.axis].plain
+    start, columns = page_start(1000.0, view.step), size[0] - 6 - 7
+    signs: dict[int, str] = {}
+    for at, mark in sorted(marks.items(), key=lambda item: -TREND_MARKS.index(item[1])):
+        column = math.floor((1000.0 - at / 2 - start) / 60 * columns)
+        if column >= 0:
+            signs[6 + column] = MARK_SIGNS[mark][0]
+    assert {at: axis[at] for at in signs} == signs
+    for mark in TREND_MARKS:
+        sign, _, name = MARK_SIGNS[mark]
+        if (at := axis.find(f" {name} ")) >= 0:
+            assert sign in (axis[at - 1], axis[at + len(name) + 2])
+
+
+def test_mark_without_room_below_is_explained_above() -> None:
+    marks = {1000.0 - at: mark for at, mark in enumerate(TREND_MARKS)}
+    heading, *_, axis, _ = curve_lines(marked_at(running_view(1000.0), marks), arrange(120, 40, 9))
+    for mark in TREND_MARKS:
+        sign, _, name = MARK_SIGNS[mark]
+        below = f"{sign} {name} " in axis.plain or f" {name} {sign}" in axis.plain
+        assert below != (f"{sign} {name}" in heading.plain)
+    assert " trip " in heading.plain
 
 
 def test_most_urgent_of_several_marks_in_a_cell_is_shown() -> None:
-    view = replace(running_view(1000.0), apart=0.0)
-    marked = {990.0: "reference", 990.5: "trip"}
-    points = tuple(replace(p, mark=marked.get(p.time, "unknown to us")) for p in view.trend)
-    axis = curve_lines(replace(view, trend=points), arrange(60, 16, 9))[-1].plain
+    marks = {990.0: "reference", 990.5: "trip", 995.0: "unknown to us"}
+    axis = curve_lines(marked_at(running_view(1000.0), marks), arrange(60, 16, 9))[-1].plain
     assert "■" in axis
     assert "◆" not in axis
 

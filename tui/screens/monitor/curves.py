@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from bisect import bisect_left
-from collections.abc import Sequence
-from itertools import groupby
-from operator import itemgetter
+from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
 from rich.style import Style
@@ -27,7 +24,6 @@ from tui.session.monitor.trend import (
 from tui.widgets.curve import (
     Curve,
     CurveScale,
-    Plot,
     Samples,
     curve_rows,
     round_up,
@@ -36,52 +32,31 @@ from tui.widgets.curve import (
 )
 from tui.widgets.drawing import short
 from tui.widgets.palette import (
-    ALARM,
-    ATTENTION,
     BAR,
-    CURSOR,
     FAINT,
-    FAULT,
     KEY,
     LINE,
     PLAIN,
-    RUNNING,
     STALE,
     STRONG,
 )
 
 from .arrange import Arrangement
+from .time_axis import (
+    LABEL_CELLS,
+    MARGIN_CELLS,
+    MARK_SIGNS,
+    REFERENCE_STYLE,
+    ShownPage,
+    axis_lines,
+    mark_names,
+    marks_on_page,
+    points_of_page,
+    ticks_of,
+)
 from .view import View, decimal_places, directed, end_of
 
-LABEL_CELLS = 5
-MARGIN_CELLS = 7
-"""Cells at the right of a curve for the latest value."""
-REFERENCE_STYLE = Style(color=KEY.color)
 NAMES: dict[Quantity, str] = {"output_frequency": "output", "motor_current": "current"}
-MARK_SIGNS: dict[TrendMark, tuple[str, Style, str]] = {
-    "lost": ("×", ALARM, "no answer"),
-    "trip": ("■", FAULT, "trip"),
-    "stop": ("▼", STRONG, "stop"),
-    "start": ("▶", RUNNING, "start"),
-    "reset": ("↑", STRONG, "reset"),
-    "write": ("●", ATTENTION, "write"),
-    "reference": ("◆", REFERENCE_STYLE, "reference"),
-}
-"""Sign, style and name of each mark."""
-
-
-class ShownPage(NamedTuple):
-    """Displayed page of time, with the data that its parts share."""
-
-    view: View
-    points: Sequence[TrendPoint]
-    """Points of the page, and one beyond each edge."""
-    columns: int
-    marks: dict[int, TrendMark]
-
-    def plot(self, rows: int, scale: CurveScale) -> Plot:
-        """Return a plot of the page with `rows` rows and a vertical scale."""
-        return _plot(self.view, self.columns, rows, scale)
 
 
 class Band(NamedTuple):
@@ -111,35 +86,21 @@ def curve_lines(view: View, room: Arrangement) -> list[Text]:
         return [nothing, *[Text("")] * (room.curve - 1)]
     columns = room.width - LABEL_CELLS - 1 - MARGIN_CELLS
     points = points_of_page(view)
-    page = ShownPage(view, points, columns, _marks(view, points, columns))
-    lines = [_heading(view, found[0], page.marks, room.width)]
+    page = ShownPage(view, points, columns, marks_on_page(view, points, columns))
+    names = mark_names(page, room.axis)
+    unnamed = {mark for mark in page.marks.values() if mark not in names}
+    lines = [_heading(view, found[0], unnamed, room.width)]
     lines += _band_lines(page, found[0], room.plot)
     if room.band:
         rest = [Text("")] * (room.band + 1)
         second = found[1] if len(found) > 1 else None
         lines += [_between(second, page), *_band_lines(page, second, room.band)] if second else rest
-    return [*lines, *_axis(page, room.axis)]
-
-
-def _plot(view: View, columns: int, rows: int, scale: CurveScale) -> Plot:
-    return Plot(view.page_start, view.step.span, scale, columns, rows, view.signs)
+    return [*lines, *axis_lines(page, room.axis, names)]
 
 
 def samples_of(points: Sequence[TrendPoint], place: int) -> Samples:
     """Return the value at index `place` of each point, with its time."""
     return [(point.time, point.values[place]) for point in points]
-
-
-def points_of_page(view: View) -> Sequence[TrendPoint]:
-    """Return the points of the page, and one beyond each edge."""
-    start = view.page_start
-    first = bisect_left(view.trend, start, key=_time)
-    end = bisect_left(view.trend, start + view.step.span, key=_time)
-    return view.trend[max(0, first - 1) : end + 1]
-
-
-def _time(point: TrendPoint) -> float:
-    return point.time
 
 
 def reach_of(view: View) -> float:
@@ -158,7 +119,7 @@ def _band_lines(page: ShownPage, band: Band, rows: int) -> list[Text]:
         curves,
         plot,
         reach_of(view),
-        ticks=tuple(column for column, _ in _ticks(page)),
+        ticks=tuple(column for column, _ in ticks_of(page)),
         marks=tuple(page.marks),
         cursor=None if view.cursor is None else plot.column(view.cursor),
     )
@@ -224,89 +185,6 @@ def bar_end(view: View, parameter: Parameter, place: int) -> float | None:
     return round_up(farthest) if farthest > 0 else None
 
 
-def _marks(view: View, points: Sequence[TrendPoint], columns: int) -> dict[int, TrendMark]:
-    """Return the most urgent mark of each column of the page."""
-    plot = _plot(view, columns, 1, CurveScale(0, 1))
-    found: dict[int, TrendMark] = {}
-    for point in points:
-        mark = point.mark and next((item for item in TREND_MARKS if item == point.mark), None)
-        if not mark or (column := plot.column(point.time)) is None:
-            continue
-        before = found.get(column)
-        if before is None or TREND_MARKS.index(mark) < TREND_MARKS.index(before):
-            found[column] = mark
-    return found
-
-
-def _ticks(page: ShownPage) -> list[tuple[int, float]]:
-    """Return the columns of the ticks, with their time of day in seconds since 1970."""
-    view, plot = page.view, page.plot(1, CurveScale(0, 1))
-    tick = view.step.tick
-    first = math.ceil((plot.start + view.apart) / tick - 1e-6) * tick
-    found = []
-    for number in range(round(view.step.span / tick) + 1):
-        wall = first + number * tick
-        # a thousandth of a column later, so that rounding errors move no tick
-        column = plot.column(wall - view.apart + view.step.span / page.columns / 1000)
-        if column is not None:
-            found.append((column, wall))
-    return found
-
-
-def _axis(page: ShownPage, rows: int) -> list[Text]:
-    """Return the time axis up to now with its marks, and the clock times below or on it."""
-    view, columns, plot = page.view, page.columns, page.plot(1, CurveScale(0, 1))
-    ticks = _ticks(page)
-    reached = plot.column(view.now) if view.now < plot.end else columns
-    reached = -1 if reached is None else reached
-    cells = [("─", FAINT) if column <= reached else (" ", FAINT) for column in range(columns)]
-    for column, _ in ticks:
-        cells[column] = ("┬", FAINT) if column <= reached else ("╷", LINE)
-    names = _clock_times(view, ticks, columns)
-    if rows == 1:
-        cells = [
-            (names[column], FAINT) if names[column] != " " else cell
-            for column, cell in enumerate(cells)
-        ]
-    for column, mark in page.marks.items():
-        cells[column] = MARK_SIGNS[mark][:2]
-    at = plot.column(view.cursor) if view.cursor is not None else None
-    if at is not None:
-        cells[at] = (cells[at][0] if cells[at][0] != " " else "┴", KEY + CURSOR)
-    axis = Text(" " * LABEL_CELLS, no_wrap=True).append("└", LINE)
-    for style, run in groupby(cells, key=itemgetter(1)):
-        axis.append("".join(character for character, _ in run), style)
-    if rows == 1:
-        return [axis]
-    return [axis, Text(" " * (LABEL_CELLS + 1), no_wrap=True).append(names, FAINT)]
-
-
-FULL_CELLS = 10
-"""Least columns between two ticks for clock times in full."""
-
-
-def _clock_times(view: View, ticks: Sequence[tuple[int, float]], columns: int) -> str:
-    """Return the row of clock times, centered on their ticks; times that overlap are omitted."""
-    cells = [" "] * (columns + MARGIN_CELLS)
-    apart = columns * view.step.tick / view.step.span
-    end = 0
-    whole = False
-    for column, wall in ticks:
-        clock = time.localtime(wall)
-        text = time.strftime("%H:%M:%S", clock)
-        if view.step.tick >= 60:
-            text = text[:5]
-        elif apart < FULL_CELLS and (whole or column + 4 < 8) and clock.tm_sec:
-            text = text[5:]
-        at = column - len(text) // 2
-        if at < end or at + len(text) > len(cells):
-            continue
-        whole = whole or len(text) == 8
-        cells[at : at + len(text)] = text
-        end = at + len(text) + 1
-    return "".join(cells)
-
-
 def _between(band: Band, page: ShownPage) -> Text:
     """Return the line above the second band, with its unit and name."""
     unit = short(band.parameter.unit or "raw", LABEL_CELLS - 1)
@@ -315,8 +193,8 @@ def _between(band: Band, page: ShownPage) -> Text:
     return text.append("─" * max(0, page.columns + LABEL_CELLS + 1 - text.cell_len), LINE)
 
 
-def _heading(view: View, band: Band, marks: dict[int, TrendMark], width: int) -> Text:
-    """Return the names of curves and marks; while the cursor is open, the values there."""
+def _heading(view: View, band: Band, marks: Collection[TrendMark], width: int) -> Text:
+    """Return the names of curves and of `marks`; while the cursor is open, the values there."""
     if view.cursor is not None:
         return _read_out(view, view.cursor, width)
     unit = band.parameter.unit or "raw"
@@ -327,7 +205,7 @@ def _heading(view: View, band: Band, marks: dict[int, TrendMark], width: int) ->
     if band.quantity == "output_frequency" and _has_reference(view):
         left.append("  ").append_text(_sample("⠂⠂", REFERENCE_STYLE, view))
         left.append(" reference", FAINT)
-    for mark in sorted(set(marks.values()), key=TREND_MARKS.index):
+    for mark in sorted(marks, key=TREND_MARKS.index):
         sign, style, name = MARK_SIGNS[mark]
         if left.cell_len + len(name) + 4 + right.cell_len >= width:
             break

@@ -22,7 +22,8 @@ from tui.widgets.gauge import gauge
 from tui.widgets.palette import BAR, BAR_REST, FAINT, LINE, PLAIN, STALE, STRONG, age_text
 from tui.widgets.readout import ROWS, big, dashes, readout_cells
 
-from .curves import bar_end, points_of_page
+from .curves import bar_end
+from .time_axis import points_of_page
 from .view import View, bar_number, decimal_places, directed, end_of
 
 SIGN_CELLS = 5

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from tui.widgets.curve import PAGE_STEPS, PageStep, page_start
 
 from .arrange import Arrangement
-from .curves import LABEL_CELLS, MARGIN_CELLS
 from .run_keys import InputKeys
+from .time_axis import LABEL_CELLS, MARGIN_CELLS
 from .view import USUAL_STEP
 
 NOTHING_TO_READ = "Nothing has been read yet: there is no curve."
