@@ -298,10 +298,9 @@ def panel_on_a_pty(
 
 
 @contextmanager
-def panel_beside(panel: PtyPanel) -> Iterator[PtyPanel]:
-    """Another panel on the same line, with its first drive on Monitor."""
-    line = (f"tcp:127.0.0.1:{panel.log.port}", "-d", "1")
-    started = start_panel([*line])
+def panel_beside(panel: PtyPanel, device: int = 1) -> Iterator[PtyPanel]:
+    """Another panel on the same line, with one drive on Monitor."""
+    started = start_panel([f"tcp:127.0.0.1:{panel.log.port}", "-d", str(device)])
     with _until_the_end(PtyPanel(*started, panel.simulation, panel.log)) as other:
         yield other
 

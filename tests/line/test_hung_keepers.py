@@ -17,6 +17,7 @@ from tests.programs import DRIVEPANEL, PATIENCE, Served, is_running, keepers, se
 from tui.session.connect.open_line import open_line
 from tui.simulator import DriveSpec, Simulation
 
+from .pty_panel import STOP, panel_beside, panel_on_a_pty
 from .test_commands import bench, turns
 from .test_keeper import keeper, times_of_good_values
 from .test_shared_programs import one_connection, records, runs_a_motor, stopped_by_commands
@@ -107,3 +108,26 @@ def test_healthy_keeper_is_kept_after_stops() -> None:
             assert keepers() == [pid]
         finally:
             opened.close()
+
+
+@pytest.mark.usefixtures("with_keepers")
+@pytest.mark.parametrize("kills", [True, False])
+def test_stop_of_all_stops_the_motor_of_an_absent_panel(*, kills: bool) -> None:
+    with panel_on_a_pty(drives=2) as panel, panel_beside(panel, device=2) as other:
+        panel.run(20)
+        other.shows("2 MACHINE")
+        before = len(panel.log.writes)
+        if kills:
+            os.kill(panel.pid, signal.SIGKILL)
+            other.shows("Drive 1: The motor is stopped in")
+        else:
+            # the next keeper learns of the motor by the record of its start alone
+            os.kill(panel.pid, signal.SIGSTOP)
+            os.kill(keeper(), signal.SIGSTOP)
+        began = time.monotonic()
+        other.type("\x1b[20~")
+        wait_until(lambda: other.look() and STOP in panel.log.writes[before:], "the stop")
+        at = panel.log.times[panel.log.writes.index(STOP, before)]
+        # long before a panel's time to take the motor over, or the drive's timeout, is over
+        assert at - began < 6.0
+        wait_until(lambda: not turns(panel.simulation), "the motor stops")

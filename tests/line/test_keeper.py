@@ -242,7 +242,7 @@ def test_program_that_died_before_the_keeper_is_still_reported(
         panel = terminal_with([*DRIVEPANEL, line, "-d", "1"])
         panel.wait_for("FORWARD")
         runner.process.kill()
-        panel.wait_for("its motor is stopped in")
+        panel.wait_for("The motor is stopped in")
         os.kill(keeper(), signal.SIGKILL)
         wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
 

@@ -20,7 +20,7 @@ from tui.session.journal import Journal
 from tui.session.sharing.care import DrivesInCare
 from tui.session.sharing.orphan_motors import OrphanMotorGuard
 
-from .test_guardian import GONE, Bench, come
+from .test_guardian import GONE, LIVING, WATCH, Bench, come
 from .test_guardian import bench as bench
 
 CARE = packed_care(library.load("atv71"), None, guessed=False)
@@ -158,3 +158,20 @@ async def test_recorded_start_does_not_stop_a_disarmed_drive(
     await come(lambda: guardian._workers != [])
     await come(lambda: not guardian.busy)
     assert bench.turns(1)
+
+
+async def test_due_stop_does_not_wait_for_a_program_that_has_left(bench: Bench) -> None:
+    """The holder of the line has just changed, so no program has armed the drive there."""
+    for device in (1, 2):
+        bench.started(device, pid=LIVING)
+    await come(lambda: bench.turns(1) and bench.turns(2))
+    guard(bench)
+    bench.line.facts.set_programs((bench.line.facts.me, WATCH))
+    bench.line.facts.set_programs((bench.line.facts.me,))
+    loop = bench.line._engine._loop
+    assert loop is not None
+    loop.call_soon_threadsafe(bench.line.facts.events.emit, StopDue((1,), "the stop key"))
+    # its record stays while the program lives
+    await come(lambda: bench.simulation.drive(1).motor.frequency == 0)
+    assert bench.simulation.drive(1).fault is None
+    assert bench.turns(2)

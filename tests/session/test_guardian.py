@@ -299,8 +299,8 @@ async def test_person_has_the_drive_timeout_to_take_over_from_a_frozen_program(
 ) -> None:
     await frozen(bench)
     let_go = bench.clock.monotonic() - ENDS_WITHIN - 0.1
-    await come(lambda: bench.says("is no longer on the line: its motor is stopped in "))
-    assert bench.says("unless it comes back or you take it over (a, then T).")
+    await come(lambda: bench.says("unless you take it over (a, then T): run (pid 900001) is no"))
+    assert bench.says("is no longer on the line. If it comes back, the motor keeps running.")
     bench.clock.advance(3.0)
     await asyncio.sleep(0.2)
     assert bench.line.facts.stops.stamp(1) == 0
@@ -316,7 +316,7 @@ async def test_person_has_the_drive_timeout_to_take_over_from_a_frozen_program(
 
 async def test_motor_of_a_program_that_recovers_in_time_runs(bench: Bench) -> None:
     await frozen(bench)
-    await come(lambda: bench.says("unless it comes back"))
+    await come(lambda: bench.says("If it comes back"))
     bench.line.facts.set_programs((bench.line.facts.me, FROZEN))
     await come(lambda: bench.says("run (pid 900001) is back: its motor keeps running."))
     bench.clock.advance(20)
@@ -338,7 +338,7 @@ async def test_program_disconnected_briefly_is_not_reported(bench: Bench) -> Non
 
 async def test_motor_of_a_frozen_program_may_be_taken_over(bench: Bench) -> None:
     await frozen(bench)
-    await come(lambda: bench.says("unless it comes back"))
+    await come(lambda: bench.says("If it comes back"))
     # as an attached panel finds it
     (found,) = bench.starts.all_found(label(bench.line.link), {FROZEN.process})
     assert bench.starts.all_found(label(bench.line.link)) == []

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import pytest
 
 from tests.waiting import until
@@ -93,3 +95,22 @@ def test_read_only_line_stops_nothing() -> None:
 def test_own_drives_are_no_business_of_the_holder() -> None:
     bench = Bench(Holder())
     assert request_stops_of_others(bench.line, {1, 2, 3}, "F9", lambda *_: None) == ()
+
+
+async def test_motor_of_a_program_that_has_left_is_stopped(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # the records are files, which tests of starts and of panels check
+    left = [SimpleNamespace(device=device) for device in (1, 2, 4)]
+    monkeypatch.setattr(module, "started_by_absent", lambda *_: left)
+    voice = Holder()
+    bench = Bench(voice)
+    bench.stop()
+    await until(lambda: len(voice.requested) == 1)
+    assert voice.requested == [(2, 3)]
+    bench.line.facts.set_programs((bench.line.facts.me,))
+    before = bench.line.facts.stops.stamp(4)
+    bench.stop()
+    await until(lambda: (4,) in voice.requested or (2, 4) in voice.requested)
+    assert bench.line.facts.stops.stamp(4) != before
+    assert not [devices for devices in voice.requested if 1 in devices], "it is its own"

@@ -148,12 +148,21 @@ class OrphanMotorGuard:
     async def _stop(self, devices: tuple[int, ...], by: str) -> None:
         """Carry out a stop that all programs already know of.
 
-        Only drives that a program has armed are stopped. The profile of a record is not enough:
-        its stop word might start a drive of another family at the same address.
+        Only drives that a program has armed are stopped, and motors that were started by a
+        program which has left the line: if it is frozen, it does not arm them again for the next
+        holder of the line. An older record is not enough: its stop word might start a drive of
+        another family at the same address.
         """
-        if unknown := [device for device in devices if self._known(device) is None]:
-            log.warning("drives %s are not stopped for %s: no program has armed them", unknown, by)
         sessions = list(filter(None, map(self._known, devices)))
+        if unknown := set(devices) - {session.device for session in sessions}:
+            found = await asyncio.to_thread(started_by_absent, self._line, self._starts)
+            records = [record for record in found if record.device in unknown]
+            sessions += filter(None, [await self._session(record) for record in records])
+            if unknown := unknown - {record.device for record in records}:
+                log.warning(
+                    "drives %s are not stopped for %s: no program has armed them",
+                    sorted(unknown), by,
+                )  # fmt: skip
         if sessions:
             self._stopper.stop(sessions, by=by, given=True)
         new = [session for session in sessions if session.device not in self._followed]
@@ -196,18 +205,14 @@ class OrphanMotorGuard:
         seconds = max(0.0, end - self._clock.monotonic())
         if not takers or not seconds:
             self._tell(device, f"{state}: its motor is stopped.")
-        elif frozen:
-            self._tell(
-                device,
-                f"{state}: its motor is stopped in {seconds:.2g} s, unless it comes back or you"
-                " take it over (a, then T).",
-            )
-        else:
-            self._tell(
-                device,
-                f"{state}: its motor is stopped in {seconds:.2g} s, unless you take it over (a,"
-                " then T).",
-            )
+            return
+        # one line of 80 columns shows the first words of a message
+        back = " If it comes back, the motor keeps running." if frozen else ""
+        self._tell(
+            device,
+            f"The motor is stopped in {seconds:.2g} s, unless you take it over (a, then T):"
+            f" {state}.{back}",
+        )
 
     def _is_back(self, program: Program) -> bool:
         return any(item.process == program.process for item in self._line.facts.programs)
@@ -284,3 +289,10 @@ class OrphanMotorGuard:
         session = DriveSession(self._line, record.device, profile)
         session.guessed = record.guessed
         return session
+
+
+def started_by_absent(line: ModbusLine, starts: Starts) -> list[StartRecord]:
+    """Return the starts by programs that have left the line, dead or frozen. Reads files."""
+    absent = pids_absent(line.facts)
+    found = starts.all_found(label(line.link), absent)
+    return [record for record in found if record.process in absent]
