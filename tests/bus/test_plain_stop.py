@@ -129,9 +129,16 @@ async def test_plain_stop_mutated_returns_its_devices_or_raises() -> None:
     assert refused > 1000
 
 
+UNATTACHED = 4711
+"""A process that shares no line."""
+
+
 async def test_plain_stop_reaches_every_program_as_from_an_unattached_one(
-    share: Share,
+    share: Share, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    # all programs of a test are in one process, so a stop from it would have their name
+    sender = Peer(UNATTACHED, os.getuid())
+    monkeypatch.setattr("tui.bus.share.greeting.peer_of", lambda _: sender)
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         owner, other = lines.open("panel"), lines.open("watch")
@@ -143,10 +150,10 @@ async def test_plain_stop_reaches_every_program_as_from_an_unattached_one(
         eventually(lambda: all(heard))
         for ((devices, by, program),) in heard:
             assert (devices, by) == ((3, 4), "drivepanel stop")
-            assert program.text == f"stop (pid {os.getpid()})"
+            assert program.text == f"stop (pid {UNATTACHED})"
             assert program not in owner.facts.programs
         # no program carries it out, so the owner does
-        assert due == [((3, 4), f"stop (pid {os.getpid()})")]
+        assert due == [((3, 4), f"stop (pid {UNATTACHED})")]
         for line in (owner, other):
             # pending writes of every program are cancelled
             assert "a stop came after it" in line.facts.refusal(line.facts.me.id, 3, before[line])
@@ -222,7 +229,12 @@ async def test_client_stops_by_a_separate_connection(share: Share) -> None:
         assert client.facts.voice is not None
         await asyncio.to_thread(client.facts.voice.stop_directly, (1, 3))
         eventually(lambda: due == [(1, 3)])
-        eventually(lambda: [pair[0] for pair in heard] == [(1, 3)])
+        eventually(lambda: len(heard) == 1)
+        ((devices, by, program),) = heard
+        assert (devices, by) == ((1, 3), "a direct stop")
+        # by the name of the first program of this process, under an id of its own
+        assert program.text == owner.facts.me.text
+        assert program.id not in (owner.facts.me.id, client.facts.me.id)
 
 
 async def test_holder_sends_no_direct_stop(share: Share) -> None:

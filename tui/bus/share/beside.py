@@ -27,7 +27,7 @@ from msgspec import Meta
 from ..bounds import MOST_FRAMES, Number, Share, Word
 from ..model import LastMinute
 from ..notes import NOTES_A_LOOK, LineNote
-from ..program import LONGEST_NAME, Program, readable
+from ..program import LONGEST_NAME, Program, pid_namespace, readable
 from ..program_use import use_by_program
 from ..trace import Frame
 from .messages import LENGTH, LONGEST_MESSAGE, NoMessage, StopGiven
@@ -45,23 +45,32 @@ FRAMES_KEPT = 20_000
 _DEVICES = range(1, 248)
 _ADDRESSES = {str(device).encode(): device for device in _DEVICES}
 _ALL = [b"all"]
-_BY = "drivepanel stop"
+_BY, _BY_PROGRAM = "drivepanel stop", "a direct stop"
 
 
 async def plain_stop(
-    reader: asyncio.StreamReader, known: Collection[int], peer: Peer | None
+    reader: asyncio.StreamReader,
+    known: Collection[int],
+    peer: Peer | None,
+    programs: Iterable[Program] = (),
 ) -> StopGiven:
     """The stop of a program that has sent its head, in the name of a program of its own.
 
-    `known` are the devices that `all` stands for. Raises NoMessage, EOFError, OSError.
+    `known` are the devices that `all` stands for. If the sender is one of the `programs` on the
+    line, the stop is shown with its name. Raises NoMessage, EOFError, OSError.
     """
     try:
         line = await reader.readuntil(b"\n")
     except asyncio.LimitOverrunError as error:
         raise NoMessage("a stop without an end") from error
     devices = stop_devices(line, known)
-    program = Program(uuid.uuid4().hex, "stop", peer.pid if peer is not None else 0)
-    return StopGiven(devices, (1,) * len(devices), _BY, program)
+    pid, id = peer.pid if peer is not None else 0, uuid.uuid4().hex
+    here = pid_namespace(), pid
+    for program in programs:
+        if pid and program.process == here:
+            named = msgspec.structs.replace(program, id=id)
+            return StopGiven(devices, (1,) * len(devices), _BY_PROGRAM, named)
+    return StopGiven(devices, (1,) * len(devices), _BY, Program(id, "stop", pid))
 
 
 def send_plain_stop(address: Path, devices: Iterable[int]) -> None:

@@ -157,7 +157,7 @@ class Greeting:
             await send_directly(writer, around.trace.frames(), facts.notes.all)
             return
         peer = peer_of(writer.get_extra_info("socket"))
-        stop = await plain_stop(reader, self._inside.devices.known, peer)
+        stop = await plain_stop(reader, self._inside.devices.known, peer, facts.programs)
         self._stopped(stop)
         facts.events.emit(StopDue(stop.devices, stop.program.text))
         self._holder.moved(arrived=False)  # its port may be closed
