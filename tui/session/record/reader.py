@@ -9,7 +9,15 @@ from typing import Any, NamedTuple
 from urllib.parse import quote
 
 from .reduction import Extent, extent_of
-from .schema import GOOD, QUALITIES, RECORD_ID, RECORD_VERSION, EventRow, RecordDamaged
+from .schema import (
+    GOOD,
+    QUALITIES,
+    RECORD_ID,
+    RECORD_VERSION,
+    RECORDED_READS,
+    EventRow,
+    RecordDamaged,
+)
 
 ROWS_AT_A_TIME = 1000
 """Rows of one query: a longer one would keep the writer from emptying the file's log."""
@@ -25,6 +33,36 @@ class RecordedWord(NamedTuple):
     quality: str
     word: int | None
     """None if the reply is not good."""
+
+
+class RecordedWords(NamedTuple):
+    """Some registers of one reply; times in microseconds, see the schema."""
+
+    session: int
+    utc: int
+    mono: int
+    took: int
+    quality: str
+    words: tuple[int, ...] | None
+    """None if the reply is not good."""
+    registers: int
+    """Registers that the request read."""
+
+
+class ReducedWords(NamedTuple):
+    """Some registers over up to 10 s; times in microseconds, see the schema."""
+
+    session: int
+    utc: int
+    mono: int
+    took: int
+    good: int
+    bad: int
+    blob: bytes | None
+    """For `extent_of`; None if no reply was good."""
+    place: int
+    """Place of the first register among those of the row."""
+    registers: int
 
 
 class ReducedWord(NamedTuple):
@@ -79,17 +117,60 @@ class RecordReader:
             extent = None if words is None else extent_of(words, registers, at, signed=signed)
             yield ReducedWord(utc, mono, took, good, bad, extent)
 
+    def replies(
+        self, device: int, register: int, count: int, since: int, until: int, *, function: int
+    ) -> Iterator[RecordedWords]:
+        """Yield each reply to a read that includes `count` registers, by the time of its request.
+
+        `since` is in the time, `until` is not.
+        """
+        columns = "utc, id, session, mono, took, quality, words, address, registers"
+        rows = self._rows("reply", columns, device, register, since, until, function, count)
+        for utc, _, session, mono, took, quality, data, address, registers in rows:
+            words = _words(data, register - address, count) if quality == GOOD else None
+            yield RecordedWords(session, utc, mono, took, QUALITIES[quality], words, registers)
+
+    def reduced_replies(
+        self, device: int, register: int, count: int, since: int, until: int, *, function: int
+    ) -> Iterator[ReducedWords]:
+        """Yield the reduced rows of reads that include `count` registers."""
+        columns = "utc, id, session, mono, took, good, bad, words, address, registers"
+        rows = self._rows("reduced", columns, device, register, since, until, function, count)
+        for utc, _, session, mono, took, good, bad, blob, address, registers in rows:
+            at = register - address
+            yield ReducedWords(session, utc, mono, took, good, bad, blob, at, registers)
+
+    def first_raw(self) -> tuple[int, int] | None:
+        """Return session and `mono` of the oldest read that is kept as it was; None without any.
+
+        Reads before it are only reduced.
+        """
+        found = self._base.execute(
+            f"SELECT session, mono FROM reply WHERE function IN {RECORDED_READS} ORDER BY id"
+            " LIMIT 1"
+        ).fetchone()
+        return None if found is None else (found[0], found[1])
+
+    def profiles(self, device: int) -> list[tuple[int, str]]:
+        """Return the events that name the profile of a drive, with their `utc`."""
+        rows = self._base.execute(
+            "SELECT utc, text FROM event WHERE kind = 'profile' AND device = ? ORDER BY utc, id",
+            (device,),
+        )
+        return list(rows)
+
     def _rows(
         self, table: str, columns: str, device: int, register: int, since: int, until: int,
-        function: int,
+        function: int, count: int = 1,
     ) -> Iterator[tuple[Any, ...]]:  # fmt: skip
         last = since, -1
+        covers = function, register, register + count
         while True:
             rows = self._base.execute(
                 f"SELECT {columns} FROM {table} WHERE device = ? AND utc >= ? AND utc < ?"
                 " AND (utc, id) > (?, ?) AND function = ? AND address <= ?"
-                " AND address + registers > ? ORDER BY utc, id LIMIT ?",
-                (device, last[0], until, *last, function, register, register, ROWS_AT_A_TIME),
+                " AND address + registers >= ? ORDER BY utc, id LIMIT ?",
+                (device, last[0], until, *last, *covers, ROWS_AT_A_TIME),
             ).fetchall()
             yield from rows
             if len(rows) < ROWS_AT_A_TIME:
@@ -104,6 +185,12 @@ class RecordReader:
             (since, until),
         )
         return [EventRow(*row) for row in found]
+
+
+def _words(data: bytes, index: int, count: int) -> tuple[int, ...]:
+    """Return `count` registers of a reply's data from a place on."""
+    places = range(2 * index, 2 * (index + count), 2)
+    return tuple(int.from_bytes(data[at : at + 2], "big") for at in places)
 
 
 _MARKS = {"application_id": RECORD_ID, "user_version": RECORD_VERSION}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Collection, Iterator
 from contextlib import suppress
-from datetime import UTC, datetime
+from datetime import UTC, date, datetime
 from pathlib import Path
 
 from ..paths import state_folder
@@ -28,8 +28,15 @@ def record_folder() -> Path:
 
 def record_path(folder: Path, line: str, day: int) -> Path:
     """The file of a line (a file name) for a day in UTC, counted from 1970."""
-    date = datetime.fromtimestamp(day * SECONDS_A_DAY, UTC).date().isoformat()
-    return folder / f"{date}_{line}{RECORD_SUFFIX}"
+    named = datetime.fromtimestamp(day * SECONDS_A_DAY, UTC).date().isoformat()
+    return folder / f"{named}_{line}{RECORD_SUFFIX}"
+
+
+def day_of_record(path: Path) -> int | None:
+    """Return the day of a file of the record, as in `record_path`; None for any other file."""
+    with suppress(ValueError):
+        return (date.fromisoformat(path.name.partition("_")[0]) - date(1970, 1, 1)).days
+    return None
 
 
 def files_of_line(folder: Path, line: str) -> list[Path]:

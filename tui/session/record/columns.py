@@ -1,0 +1,96 @@
+"""Points of a history as columns of equal time: minimum, mean and maximum; and its gaps. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import median
+from typing import NamedTuple
+
+from .history import HistoryPoint
+from .reduction import REDUCED_OVER
+
+GAP_POINTS = 3
+"""Usual distances of two points from which on there is a gap between them."""
+SAMPLED_DISTANCES = 200
+
+
+class HistoryColumn(NamedTuple):
+    """Values of one column."""
+
+    least: float
+    mean: float
+    """Mean of the replies, each with the same weight."""
+    most: float
+    good: int
+    bad: int
+    """Numbers of good replies and of others."""
+    reduced: bool
+    """True if a reduced point is among them: it may reach beyond the column."""
+    exact: bool
+
+
+def history_columns(
+    points: Sequence[HistoryPoint], start: float, span: float, count: int
+) -> list[HistoryColumn | None]:
+    """Return `count` columns of equal time from `start` on; None for one without a value.
+
+    A reduced point is in each column that it reaches. Times are as in the points, in seconds.
+    """
+    found: list[list[HistoryPoint]] = [[] for _ in range(count)]
+    per_second = count / span
+    for point in points:
+        first = math.floor((point.time - start) * per_second)
+        last = math.floor((point.end - start) * per_second)
+        for column in range(max(first, 0), min(last, count - 1) + 1):
+            found[column].append(point)
+    return [_column(column) for column in found]
+
+
+def _column(points: Sequence[HistoryPoint]) -> HistoryColumn | None:
+    least, most, total, good, bad = math.inf, -math.inf, 0.0, 0, 0
+    reduced, exact = False, True
+    for point in points:
+        bad += point.bad
+        if point.least is None or point.mean is None or point.most is None:
+            continue
+        least, most = min(least, point.least), max(most, point.most)
+        total += point.mean * point.good
+        good += point.good
+        reduced, exact = reduced or point.reduced, exact and point.exact
+    if not good:
+        return None
+    return HistoryColumn(least, total / good, most, good, bad, reduced, exact)
+
+
+def reach_of_points(points: Sequence[HistoryPoint]) -> float:
+    """Return the longest time, in seconds, between two points without a gap.
+
+    It is GAP_POINTS times their usual distance, and at least two reduced points' if there are any.
+    """
+    raw = [point.time for point in points if not point.reduced]
+    apart = [b - a for a, b in pairwise(raw[-SAMPLED_DISTANCES:]) if b > a]
+    reach = GAP_POINTS * median(apart) if apart else 0.0
+    if any(point.reduced for point in points):
+        reach = max(reach, 2 * REDUCED_OVER / 1e6)
+    return reach
+
+
+def gaps_of(points: Sequence[HistoryPoint], reach: float) -> list[tuple[float, float]]:
+    """Return the times without a value: between two values more than `reach` seconds apart, and
+    around points that have none. Those before the first and after the last value are included only
+    if such points are there."""
+    gaps: list[tuple[float, float]] = []
+    begin: float | None = None
+    failed = False
+    for point in points:
+        if point.mean is None:
+            failed, begin = True, point.time if begin is None else begin
+            continue
+        if begin is not None and (failed or point.time - begin > reach):
+            gaps.append((begin, point.time))
+        begin, failed = point.end, False
+    if failed and begin is not None:
+        gaps.append((begin, points[-1].end))
+    return gaps

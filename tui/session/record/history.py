@@ -1,0 +1,399 @@
+"""Values of one parameter over a time, from the records of a line: raw rows joined to reduced ones.
+
+It reads files, for up to a second: call it in a thread of its own, never in an event loop or the
+line's thread. Each value is decoded with the profile that the record names for its time.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from bisect import bisect_right
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass, field
+from functools import partial
+from operator import attrgetter
+from pathlib import Path
+from typing import NamedTuple, TypeVar
+
+from tui.drive.errors import ProfileError, UnknownProfile
+from tui.drive.profile.library import load
+from tui.drive.profile.profile import Profile, digest_of
+from tui.drive.profile.schema import Parameter
+from tui.drive.shown import depends_on, number_of
+from tui.drive.values import from_words, is_enumeration, is_field, word_count
+
+from .reader import RecordReader, ReducedWords
+from .reduction import REDUCED_OVER, Extent, extent_of
+from .ring import SECONDS_A_DAY, day_of_record
+from .schema import QUALITIES, REFUSED, RecordDamaged
+
+SOURCES_BEFORE = 3600.0
+"""Seconds before the time in which a word that determines a scale is searched."""
+WITHOUT_VALUE = "no value"
+"""Quality of a reply with the word of the family for "no value", perhaps in a part of 10 s."""
+NO_GOOD_REPLY = "no good reply"
+UNKNOWN_SCALE = "scale not recorded"
+NOT_KEPT = "changed within 10 s"
+"""Quality of a part of a word that changed: the record has no extent of it."""
+OTHER_UNIT = "in another unit"
+_GOOD = QUALITIES[0]
+_WORD = 0x10000
+Row = TypeVar("Row")
+
+
+class HistoryPoint(NamedTuple):
+    """One reply, or the replies of up to 10 s; times in seconds since 1970."""
+
+    time: float
+    """Time of the reply; the first request of a reduced point."""
+    end: float
+    """The same as `time`, or the end of the last reply of a reduced point."""
+    least: float | None
+    """None, as the next two, if there is no value; `quality` gives the reason."""
+    mean: float | None
+    most: float | None
+    quality: str = _GOOD
+    good: int = 1
+    bad: int = 0
+    """Numbers of good replies and of others."""
+    reduced: bool = False
+    exact: bool = True
+    """False if the values may lie within `least` and `most`: a value of two registers whose high
+    word changed."""
+    raw: int | None = None
+    """The raw value, if it is one."""
+
+
+@dataclass(frozen=True, slots=True)
+class History:
+    """Values of one parameter of one drive; `points` are in the order of their times."""
+
+    points: Sequence[HistoryPoint]
+    unit: str = ""
+    entry: Parameter | None = None
+    """The parameter, as the last profile describes it."""
+    troubles: Sequence[str] = ()
+    """Reasons why files were not read or values not decoded, as sentences."""
+
+
+@dataclass(slots=True)
+class _RawPoint:
+    """A point before it is decoded; times in microseconds."""
+
+    time: int
+    end: int
+    extent: Extent | None
+    quality: str = _GOOD
+    good: int = 1
+    bad: int = 0
+    reduced: bool = False
+    exact: bool = True
+    raw: int | None = None
+
+
+@dataclass(slots=True)
+class _Reading:
+    """Files of one call, and its troubles."""
+
+    files: Sequence[Path]
+    device: int
+    own: Profile | None
+    troubles: dict[str, None] = field(default_factory=dict)
+
+    def note(self, text: str) -> None:
+        self.troubles.setdefault(text)
+
+    def rows(
+        self, since: float, until: float, read: Callable[[RecordReader], Iterable[Row]]
+    ) -> list[Row]:
+        """Return the rows of each file that may have some of a time; note what cannot be read."""
+        days = since // SECONDS_A_DAY, until // SECONDS_A_DAY
+        found: list[Row] = []
+        for path in self.files:
+            day = day_of_record(path)
+            if day is not None and not days[0] <= day <= days[1]:
+                continue
+            try:
+                with closing(RecordReader(path)) as reader:
+                    found += read(reader)
+            except (sqlite3.Error, RecordDamaged, OSError) as error:
+                if path.exists():  # else it was removed to make room
+                    self.note(f"{path.name} cannot be read: {error}.")
+        return found
+
+
+def read_history(
+    files: Sequence[Path],
+    device: int,
+    code: str,
+    since: float,
+    until: float,
+    *,
+    own: Profile | None = None,
+) -> History:
+    """Return the values of a parameter of a drive from `since` to before `until`.
+
+    Times are in seconds since 1970; a reduced point may begin up to 10 s before `since`. `own` is
+    the profile that this program uses for the drive: it has the learned scales, and is not loaded.
+    """
+    work = _Reading(files, device, own)
+    periods = _profiles(work, since, until)
+    profiles = {id(profile): profile for _, profile in periods if profile is not None}
+    points: list[HistoryPoint] = []
+    last: tuple[Parameter, str] | None = None
+    for profile in profiles.values():
+        if (entry := profile.get(code)) is None:
+            work.note(f"The profile {profile.id} has no {code}.")
+            continue
+        sources = {
+            source: _source(work, profile, source, since, until) for source in depends_on(entry)
+        }
+        decoder = _Decoder(profile, entry, sources)
+        own_time = partial(_in_force, periods, profile)
+        raws = _raw_points(work, profile, entry, since, until)
+        found = [decoder.point(raw) for raw in raws if own_time(raw.time)]
+        if found or last is None:
+            last = entry, decoder.unit
+        points += found
+    points.sort(key=attrgetter("time"))
+    entry, unit = last if last is not None else (None, "")
+    return History(points, unit, entry, tuple(work.troubles))
+
+
+Periods = Sequence[tuple[int, Profile | None]]
+"""Profiles with the time from which they apply, in microseconds since 1970."""
+
+
+def _profiles(work: _Reading, since: float, until: float) -> Periods:
+    """Return the profiles of a drive, the first one from the beginning on."""
+    found: dict[int, Profile | None] = {}
+    known: dict[str, Profile | None] = {}
+    before = since - SOURCES_BEFORE
+    for utc, text in work.rows(before, until, lambda reader: reader.profiles(work.device)):
+        if text not in known:
+            known[text] = _profile_of(work, text)
+        found[utc] = known[text]
+    if not found:
+        work.note("The record names no profile for this drive.")
+    periods = sorted(found.items(), key=lambda item: item[0])
+    return [(-_FAR, periods[0][1]), *periods] if periods else []
+
+
+_FAR = 1 << 62
+
+
+def _profile_of(work: _Reading, text: str) -> Profile | None:
+    """Load the profile that an event names; None, and a note, if that is not possible."""
+    try:
+        named = json.loads(text)
+        name, digest = str(named["profile"]), str(named["hash"])
+    except (ValueError, KeyError, TypeError):
+        name, digest = text, ""
+    if work.own is not None and (name, digest) == (work.own.id, digest_of(work.own)):
+        return work.own
+    try:
+        profile = load(name)
+    except (ProfileError, UnknownProfile, OSError) as error:
+        work.note(f"The values are not decoded: {error}")
+        return None
+    if digest != digest_of(profile):
+        work.note(f"The profile {name} has changed since the record: values may differ.")
+    return profile
+
+
+def _in_force(periods: Periods, profile: Profile, utc: int) -> bool:
+    at = bisect_right(periods, utc, key=lambda period: period[0]) - 1
+    return periods[at][1] is profile
+
+
+ScaleWords = Sequence[tuple[int, int | None, bool]]
+"""Raw values of a word that determines a scale, by time in microseconds; None if unknown, and True
+if the drive has no such word."""
+
+
+def _source(work: _Reading, profile: Profile, code: str, since: float, until: float) -> ScaleWords:
+    raws = _raw_points(work, profile, profile[code], since - SOURCES_BEFORE, until)
+    found = []
+    for point in raws:
+        if point.extent is not None:
+            steady = point.extent.least == point.extent.most
+            found.append((point.time, point.extent.least if steady else None, False))
+        elif point.quality == QUALITIES[REFUSED]:
+            found.append((point.time, None, True))
+    return sorted(found, key=lambda item: item[0])
+
+
+def _raw_points(
+    work: _Reading, profile: Profile, entry: Parameter, since: float, until: float
+) -> list[_RawPoint]:
+    """Return the points of a parameter: each reply once, as it was or reduced."""
+    times = round(since * 1e6), round(until * 1e6)
+
+    def read(reader: RecordReader) -> Iterable[_RawPoint]:
+        return _points_of_file(reader, work.device, profile, entry, times)
+
+    return work.rows(since - REDUCED_OVER / 1e6, until, read)
+
+
+def _points_of_file(
+    reader: RecordReader, device: int, profile: Profile, entry: Parameter, times: tuple[int, int]
+) -> Iterable[_RawPoint]:
+    """Yield the points of one file.
+
+    Rows may expire while it is read. So the replies are read first: what expired before its turn,
+    or has since, is then taken from the reduced rows.
+    """
+    count, unknown = word_count(entry), profile.data.reading.unknown_word
+    place = device, entry.address, count
+    replies = list(reader.replies(*place, *times, function=entry.function))
+    first = reader.first_raw()
+    covered: dict[int, list[tuple[int, int]]] = {}
+    begin = times[0] - REDUCED_OVER, times[1]
+    for row in reader.reduced_replies(*place, *begin, function=entry.function):
+        ends_before = row.utc + row.took < times[0]
+        if not ends_before and (first is None or (row.session, row.mono) < first):
+            covered.setdefault(row.session, []).append((row.mono, row.mono + row.took))
+            yield _reduced_point(row, entry, profile)
+    spans = {session: sorted(rows) for session, rows in covered.items()}
+    for reply in replies:
+        if _is_covered(spans.get(reply.session, ()), reply.mono):
+            continue
+        end = reply.utc + reply.took
+        if reply.words is None:
+            yield _RawPoint(end, end, None, reply.quality, 0, 1)
+        elif unknown in reply.words and reply.registers != count:
+            yield _RawPoint(end, end, None, WITHOUT_VALUE, 0, 1)
+        else:
+            raw = from_words(entry, reply.words)
+            yield _RawPoint(end, end, Extent(raw, raw, raw), raw=raw)
+
+
+def _is_covered(spans: Sequence[tuple[int, int]], mono: int) -> bool:
+    at = bisect_right(spans, (mono, _FAR)) - 1
+    return at >= 0 and mono <= spans[at][1]
+
+
+def _reduced_point(row: ReducedWords, entry: Parameter, profile: Profile) -> _RawPoint:
+    point = _RawPoint(row.utc, row.utc + row.took, None, "", row.good, row.bad, reduced=True)
+    if row.blob is None:
+        point.quality = NO_GOOD_REPLY
+        return point
+    count = word_count(entry)
+    words = [
+        (_extent(row, index, signed=False), _extent(row, index, signed=True))
+        for index in range(count)
+    ]
+    unknown = profile.data.reading.unknown_word
+    if (
+        unknown is not None
+        and row.registers != count
+        and any(_has(word, unknown) for word in words)
+    ):
+        point.quality = WITHOUT_VALUE
+        return point
+    taught = profile.taught.get(entry.code)
+    signed = entry.type.startswith("int") or (taught is not None and taught.signed is True)
+    if count == 1:
+        point.extent = words[0][signed]
+        if is_field(entry):
+            point.extent = _field_extent(entry, words[0][0])
+    else:
+        low, high = words if entry.low_word_first else reversed(words)
+        point.extent, point.exact = _joined(high[signed], low[0])
+    point.quality = _GOOD if point.extent is not None else NOT_KEPT
+    return point
+
+
+def _extent(row: ReducedWords, index: int, *, signed: bool) -> Extent:
+    assert row.blob is not None
+    return extent_of(row.blob, row.registers, row.place + index, signed=signed)
+
+
+def _has(word: tuple[Extent, Extent], unknown: int) -> bool:
+    """True if an end of a word's extent is the word for "no value"."""
+    return any(end % _WORD == unknown for extent in word for end in (extent.least, extent.most))
+
+
+def _field_extent(entry: Parameter, word: Extent) -> Extent | None:
+    """Return the extent of some bits of a word; None if the word changed."""
+    if word.least != word.most:
+        return None
+    raw = from_words(entry, [word.least])
+    return Extent(raw, raw, raw)
+
+
+def _joined(high: Extent, low: Extent) -> tuple[Extent, bool]:
+    """Return an extent that includes all values of two registers, and True if it is exact."""
+    mean = high.mean * _WORD + low.mean
+    joined = Extent(high.least * _WORD + low.least, mean, high.most * _WORD + low.most)
+    return joined, high.least == high.most
+
+
+@dataclass(slots=True)
+class _Decoder:
+    """Makes engineering values of raw ones, with the scale of their time."""
+
+    profile: Profile
+    entry: Parameter
+    sources: Mapping[str, ScaleWords]
+    unit: str = field(init=False, default="")
+    """Unit of the first value, and of all others that are not gaps."""
+    _raws: dict[str, int] = field(init=False, default_factory=dict)
+    _absent: set[str] = field(init=False, default_factory=set)
+
+    def point(self, raw: _RawPoint) -> HistoryPoint:
+        """Return a point with its values."""
+        if raw.extent is None:
+            return self._gap(raw, raw.quality)
+        self._set_sources(raw.time)
+        least, most = (self._number(end) for end in (raw.extent.least, raw.extent.most))
+        if least is None or most is None:
+            return self._gap(raw, UNKNOWN_SCALE)
+        unit = self._unit()
+        if self.unit and unit != self.unit:
+            return self._gap(raw, OTHER_UNIT)
+        self.unit = unit
+        mean = self._mean(raw.extent, least, most)
+        return HistoryPoint(
+            raw.time / 1e6, raw.end / 1e6, min(least, most), mean, max(least, most), raw.quality,
+            raw.good, raw.bad, raw.reduced, raw.exact, raw.raw,
+        )  # fmt: skip
+
+    def _gap(self, raw: _RawPoint, why: str) -> HistoryPoint:
+        return HistoryPoint(
+            raw.time / 1e6, raw.end / 1e6, None, None, None, why,
+            raw.good, raw.bad, raw.reduced, raw.exact, raw.raw,
+        )  # fmt: skip
+
+    def _set_sources(self, utc: int) -> None:
+        for code, source in self.sources.items():
+            at = bisect_right(source, utc, key=lambda item: item[0]) - 1
+            _, raw, missing = source[at] if at >= 0 else (0, None, False)
+            self._raws.pop(code, None)
+            self._absent.discard(code)
+            if raw is not None:
+                self._raws[code] = raw
+            if missing:
+                self._absent.add(code)
+
+    def _number(self, raw: int) -> float | None:
+        if self.entry.bits or is_enumeration(self.entry):
+            return float(raw)
+        number = number_of(self.profile, self.entry, raw, self._raws, self._absent)
+        return None if number is None else float(number)
+
+    def _unit(self) -> str:
+        if self.entry.bits or is_enumeration(self.entry):
+            return ""
+        if (taught := self.profile.taught.get(self.entry.code)) is not None:
+            return taught.unit
+        return self.profile.unit(self.entry, self._raws)
+
+    def _mean(self, extent: Extent, least: float, most: float) -> float:
+        """Return the mean between two ends; scales are linear."""
+        if extent.least == extent.most:
+            return least
+        share = (extent.mean - extent.least) / (extent.most - extent.least)
+        return least + share * (most - least)
