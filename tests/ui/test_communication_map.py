@@ -10,11 +10,13 @@ import pytest
 from tests.drive.test_channels import IDLE
 from tests.drive.test_signal_path import ATV21, ATV71, PX
 from tests.session.sets_bench import bench
+from tui.app import DrivePanelApp
 from tui.drive.blocks.user_words import FORMATS, UserWord, WordFormat
 from tui.drive.profile import library
 from tui.drive.profile.schema import Quantity
 from tui.safety import LOOK_IS_OLD
 from tui.screens.control.map_screen import MapScreen, row_lines, word_lines
+from tui.screens.frame import TAB_OF_PAGE, TABS
 from tui.session.blocks.editor import load_words
 from tui.session.communication_map import CommunicationMap, MapRow
 from tui.session.console import DriveConsole
@@ -145,3 +147,45 @@ async def test_word_is_chosen_and_formatted_by_keys() -> None:
         await pilot.press("delete")
         await pilot.pause()
         assert found.own[1].address == 0
+
+
+def shown_rows(app: DrivePanelApp) -> list[str]:
+    """Rows of the terminal."""
+    return [strip.text.rstrip() for strip in app.screen._compositor.render_strips()]
+
+
+@pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])
+async def test_every_row_of_the_map_can_be_reached(size: tuple[int, int]) -> None:
+    """At 80 x 24 the map ended with an ellipsis before ETI."""
+    app, found = fakes.app_of(kind=fakes.Easel), map_of("atv71")
+    for slot in range(1, 9):
+        found.console.session.image.confirm(f"NMA{slot}", 3201, fakes.NOW)
+    app.opened = fakes.opened()
+    fakes.choose(app, found.console)
+
+    async def read(codes: list[str], **_: Any) -> Any:
+        return {}
+
+    found.console.read = read  # type: ignore[method-assign, assignment]
+    async with app.run_test(size=size) as pilot:
+        await app.push_screen(MapScreen(found.console))
+        await pilot.pause()
+        wanted = {line.plain.rstrip() for row in found.rows for line in row_lines(row, size[0])}
+        first = set(shown_rows(app))
+        heading = next(row for row in first if row.startswith("Channels"))
+        assert ("PgUp, PgDn" in heading) == bool(wanted - first)
+        seen = set(first)
+        for _ in range(1 + len(wanted) // (size[1] - 10)):
+            await pilot.press("pagedown")
+            await pilot.pause()
+            seen |= set(shown_rows(app))
+        assert wanted <= seen
+        await pilot.press("pageup", "pageup")
+        await pilot.pause()
+        assert wanted & set(shown_rows(app)) == wanted & first
+
+
+def test_page_of_a_screen_lights_its_tab() -> None:
+    names = {tab.place for tab in TABS}
+    assert TAB_OF_PAGE == {"map": "control", "listening": "frames"}
+    assert set(TAB_OF_PAGE.values()) <= names

@@ -370,7 +370,7 @@ SHOW = {
     "scanner": {"up", "down", "tab", "left", "right"},
     "faults": {"up", "down", "left", "right", "tab"},
     "control": {"tab"},
-    "map": {"left", "right", "tab"},
+    "map": {"left", "right", "tab", "pageup", "pagedown"},
     "frames": {*ARROWS, "tab"},
     "listening": {*ARROWS, "tab"},
     "messages": ARROWS,

@@ -26,11 +26,7 @@ from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLA
 from tui.widgets.small import is_too_small, small_lines
 from tui.widgets.strip import BarMessage, FrameView, Tab, message_line, strip_line, tabs_line
 
-from .keys.action import (
-    FRAMES,
-    LISTENING,
-)
-from .keys.screens import TABBED
+from .keys.screens import SCREENS, TABBED
 from .keys.table import once_closed, stop_keys
 
 if TYPE_CHECKING:
@@ -38,6 +34,7 @@ if TYPE_CHECKING:
 
     from .app_port import Panel
 
+TAB_OF_PAGE = {page.name: page.tab.lower() for page in SCREENS if page.tab}
 TABS = tuple(Tab(tab.name, tab.digit, tab.title, tab.narrow) for tab in TABBED)
 MESSAGE_KIND_STYLES: dict[str, Style] = {
     "fault": FAULT,
@@ -95,7 +92,7 @@ class Framed(Screen[Any]):
 
     def _parts(self, view: FrameView, width: int) -> dict[str, list[Text]]:
         here = (self.TITLE or "").lower() or view.place
-        here = FRAMES if here == LISTENING else here  # Listening is a mode of Frames
+        here = TAB_OF_PAGE.get(here, here)
         lead = not self.takes_letters
         news = view.message is not None or not view.not_stopped
         parts = {

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
+from textual.binding import Binding
 from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
@@ -31,8 +32,8 @@ ROW_LINES = 3
 """Lines of one row at most."""
 WORD_CELLS = 36
 """Cells of a chosen word without its name: place, value, format."""
-USED_ROWS = 11
-"""Rows of the frame, the titles, the chosen words and the hint."""
+USED_ROWS = 10
+"""Rows of the frame, the titles and the chosen words."""
 NO_WORD = "none: press Enter to choose a parameter"
 
 
@@ -50,6 +51,16 @@ def row_lines(row: MapRow, width: int) -> list[Text]:
     lines = [first.append(parts[0] if parts else "", PLAIN)]
     rest = " " * (TEXT_CELLS + 1)
     return [*lines, *(Text(f"{indent}{rest}{part}", PLAIN) for part in parts[1:])]
+
+
+class WordList(OptionList, inherit_bindings=False):
+    """The chosen words; the keys of pages scroll the map above it."""
+
+    BINDINGS: ClassVar = [
+        Binding("up", "cursor_up", show=False),
+        Binding("down", "cursor_down", show=False),
+        Binding("enter", "select", show=False),
+    ]
 
 
 def word_lines(words: Sequence[tuple[UserWord, str, str]], width: int) -> list[Text]:
@@ -82,11 +93,14 @@ class MapScreen(PanelScreen):
         self.console = console
         self._map = CommunicationMap(console)
         self._trouble = ""
+        self._top = 0
+        """First line of the map that is shown."""
+        self._room = 1
 
     def body(self) -> ComposeResult:
         """The rows of the map, the chosen words, and a hint."""
         yield Lines(id="map")
-        yield OptionList(id="words", compact=True)
+        yield WordList(id="words", compact=True)
         yield Lines(id="hint")
 
     def on_mount(self) -> None:
@@ -115,14 +129,14 @@ class MapScreen(PanelScreen):
         """Draw the map; the list is only filled again if a word of it changed."""
         super().draw(width)
         lines = [line for row in self._map.rows for line in row_lines(row, width)]
-        most = max(1, self.size.height - USED_ROWS)
-        if len(lines) > most:
-            lines = [*lines[: most - 1], Text("  …", FAINT)]
-        titled = [rule("Channels and words", width), *lines, rule("Words of your choice", width)]
-        self.put_all("map", titled)
-        self.put(
-            "hint", [Text(f"  {part}", ALARM) for part in wrapped(self._trouble, width - 4, 2)]
-        )
+        trouble = [Text(f"  {part}", ALARM) for part in wrapped(self._trouble, width - 4, 2)]
+        self._room = max(1, self.size.height - USED_ROWS - len(trouble))
+        self._top = max(0, min(self._top, len(lines) - self._room))
+        shown = lines[self._top : self._top + self._room]
+        place = f"{self._top + 1} to {self._top + len(shown)} of {len(lines)}, PgUp, PgDn"
+        head = rule("Channels and words", width, place if len(shown) < len(lines) else "")
+        self.put_all("map", [head, *shown, rule("Words of your choice", width)])
+        self.put("hint", trouble)
         self._list()
 
     def _list(self) -> None:
@@ -161,6 +175,11 @@ class MapScreen(PanelScreen):
 
         profile = self.console.session.profile
         self.app.push_screen(PickParameter(profile, None, f"word {place + 1}"), chosen)
+
+    def action_page(self, step: int) -> None:
+        """Scroll the map by its visible rows, `step` times."""
+        self._top = max(0, self._top + step * self._room)
+        self.look()
 
     def action_turn_format(self, step: int) -> None:
         """Give the word under the cursor the next format, or the previous one."""

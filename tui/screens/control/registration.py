@@ -59,12 +59,15 @@ REGISTERED = (
     ),
     Registration(
         title="Map",
+        tab="Control",
         create=create_map,
         actions=(
             Action("choose_word", "enter", "choose", CHOOSE_WORD, bound=False),
             *key_rows(
                 ("turn_format(1)", "right", "format", "Show the word in the next format."),
                 ("turn_format(-1)", "left", "", "Show the word in the previous format."),
+                ("page(1)", "pagedown", "", "Show the rows of the map that follow."),
+                ("page(-1)", "pageup", "", "Show the rows of the map that come before."),
                 ("clear_word", "delete", "", "Clear the word under the cursor."),
                 ("other_page", "tab", "back", "Go back to the switches."),
                 ("leave", "escape", "", "Go back to Control."),

@@ -60,6 +60,7 @@ REGISTERED = (
     ),
     Registration(
         title="Listening",
+        tab="Frames",
         about="the traffic of other masters and their drives; a mode of Frames",
         key="H",
         actions=(

@@ -127,6 +127,8 @@ class Registration(NamedTuple):
     """The key that opens it, if it has no digit."""
     narrow: str = ""
     """Its name in the tabs of a narrow terminal."""
+    tab: str = ""
+    """The title of the screen whose tab is lit, for a page or a mode of it that has no digit."""
     create: Callable[[DriveConsole], Screen[None]] | None = None
     """Creates the screen on a drive; imports it when called."""
     refusal: Callable[[DriveConsole], str] = lambda console: ""
