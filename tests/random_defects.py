@@ -13,7 +13,8 @@ import re
 import tempfile
 import time
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, closing
 from dataclasses import asdict, dataclass
 from fnmatch import fnmatch
 from functools import cache, cached_property
@@ -24,9 +25,11 @@ import pytest
 
 from tests import reached
 from tests.defects.equivalent import EQUIVALENT
+from tests.forked import LONGEST, Forks
 from tests.mutants import SURVIVED, copies, dealt, replaced, run_tests
 from tests.mutator import Defaults, Mutant, Mutator, Site
 from tests.sources import PACKAGE, ROOT, modules, tree_of
+from tests.swapped import NotSwapped
 
 PACKAGES = ("bus", "keeper", "session", "drive", "cli", "screens")
 LEAST = 0.92
@@ -195,10 +198,23 @@ class Chooser:
             first.append("tests/test_locks.py")
         return [part for part in (first, then) if part]
 
+    def runs_at_import(self, mutant: Mutant) -> bool:
+        """True if a fork, which begins after all imports, would not run it again."""
+        lines = self._record.lines(mutant.path)
+        return not mutant.lines or any(
+            reached.AT_IMPORT in lines.get(line, ()) for line in mutant.lines[0]
+        )
+
+    def patience(self, tests: Iterable[str]) -> float:
+        """Seconds after which these tests hang: several times what they have taken."""
+        took = (self._record.tests[name].seconds for name in tests if name in self._record.tests)
+        return min(LONGEST, 45 + 3 * sum(took))
+
     def _reaching(self, mutant: Mutant) -> set[str]:
         lines = self._record.lines(mutant.path)
         for span in mutant.lines:
-            if found := set().union(*(lines.get(line, set()) for line in span)):
+            found = set().union(*(lines.get(line, set()) for line in span)) - {reached.AT_IMPORT}
+            if found:
                 return found
         # a function that no test reaches may run at import, as one that makes a table
         names = [mutant.function.rpartition(".")[2]] if mutant.lines else mutant.names
@@ -230,7 +246,7 @@ class Chooser:
                     part.append(name)
                     seconds -= takes
             left = [name for name in left if name not in part]
-            parts.append(part)
+            parts.append(sorted(part, key=lambda name: self._record.tests[name].seconds))
         return parts
 
     def _different(self, names: Sequence[str], path: str) -> Iterator[str]:
@@ -289,14 +305,15 @@ def _exists(name: str) -> bool:
 class Judge:
     """Plants one defect at a time in copies, and believes only a test that fails by it alone."""
 
-    def __init__(self, tests: Mapping[Mutant, list[list[str]]]) -> None:
-        self._tests = tests
+    def __init__(self, chooser: Chooser, forks: Mapping[Path, Forks]) -> None:
+        self._chooser = chooser
+        self._forks = forks
         self._passes: dict[str, bool] = {}
 
     def judge(self, mutant: Mutant, copy: Path) -> Judged:
         """Plant a defect in a copy and run the tests that reach it."""
         begun = time.monotonic()
-        tests = self._tests[mutant]
+        tests = self._chooser.tests(mutant)
         if mutant.identity in EQUIVALENT:
             by = EQUAL
         else:
@@ -307,45 +324,64 @@ class Judge:
         return Judged(mutant.identity, package, mutant.line, by, seconds, count)
 
     def _noticed_by(self, mutant: Mutant, parts: list[list[str]], copy: Path) -> str:
+        """The test that fails in forks, or in a new process if only that runs the defect."""
         path = copy / mutant.path
-        defective = mutant.apply(path.read_text("utf-8"))
-        for tests in map(list.copy, parts):
-            while tests:
-                with replaced(path, defective):
-                    failed = self._first_failure(tests, copy)
-                    repeated = failed and self._first_failure([failed], copy)
-                if not failed:
-                    break
-                if repeated and self._passes_without(failed, copy):
+        before = path.read_text("utf-8")
+        after = mutant.apply(before)
+        runs_at_import = self._chooser.runs_at_import(mutant)
+
+        def in_fork(tests: list[str], defective: bool) -> str:
+            change = (mutant.path, before, after) if defective else ("", "", "")
+            result = self._forks[copy].run(tests, *change, self._chooser.patience(tests))
+            if result.not_swapped:
+                raise NotSwapped(result.not_swapped)
+            return result.failed
+
+        def in_process(tests: list[str], defective: bool) -> str:
+            with replaced(path, after if defective else before):
+                return _first_failure(tests, copy)
+
+        try:
+            with replaced(path, after):  # for programs that tests start
+                by = self._search(parts, in_fork)
+        except NotSwapped:
+            by, runs_at_import = "", True
+        return by or (self._search(parts, in_process) if runs_at_import else "") or SURVIVED
+
+    def _search(self, parts: list[list[str]], run: Callable[[list[str], bool], str]) -> str:
+        """The first test that fails twice with the defect and passes without it; else empty."""
+        for tests in parts:
+            while tests and (failed := run(tests, True)):
+                if run([failed], True) and self._passes_without(failed, run):
                     return failed
                 if failed not in tests:
                     break  # one of a file that was chosen as a whole
-                tests.remove(failed)
-        return SURVIVED
-
-    def _first_failure(self, tests: list[str], copy: Path) -> str:
-        """The test that fails, the first one if it hangs as a whole; empty if all pass."""
-        while tests:
-            status, output = run_tests(tests, copy)
-            if status in (0, 5):
-                return ""
-            failed = [
-                test
-                for test in tests
-                if re.search(rf"^(FAILED|ERROR) {re.escape(test)}", output, re.M)
-            ]
-            if failed:
-                return failed[0]
-            gone = re.findall(r"not found: \S*?(tests/\S+::.*)$", output, re.M)
-            if not any(test in tests for test in gone):
-                return tests[0]  # the process hung, or no module can be imported
-            tests[:] = [test for test in tests if test not in gone]
+                tests = tests[tests.index(failed) + 1 :]
         return ""
 
-    def _passes_without(self, test: str, copy: Path) -> bool:
+    def _passes_without(self, test: str, run: Callable[[list[str], bool], str]) -> bool:
         if test not in self._passes:
-            self._passes[test] = run_tests([test], copy)[0] == 0
+            self._passes[test] = not run([test], False)
         return self._passes[test]
+
+
+def _first_failure(tests: list[str], copy: Path) -> str:
+    """The test that fails, the first one if it hangs as a whole; empty if all pass."""
+    tests = tests.copy()
+    while tests:
+        status, output = run_tests(tests, copy)
+        if status in (0, 5):
+            return ""
+        failed = [
+            test for test in tests if re.search(rf"^(FAILED|ERROR) {re.escape(test)}", output, re.M)
+        ]
+        if failed:
+            return failed[0]
+        gone = re.findall(r"not found: \S*?(tests/\S+::.*)$", output, re.M)
+        if not any(test in tests for test in gone):
+            return tests[0]  # the process hung, or no module can be imported
+        tests = [test for test in tests if test not in gone]
+    return ""
 
 
 # -- report ----------------------------------------------------------------------------------------
@@ -416,10 +452,9 @@ def main(requested: argparse.Namespace) -> int:
             flush=True,
         )
 
-    chooser = Chooser(record)
-    tests = {mutant: chooser.tests(mutant) for mutant in mutants}  # by the source of this moment
-    with copies(requested.jobs) as made:
-        dealt(Judge(tests).judge, mutants, made, show)
+    with copies(requested.jobs) as made, ExitStack() as stack:
+        forks = {copy: stack.enter_context(closing(Forks(copy))) for copy in made}
+        dealt(Judge(Chooser(record), forks).judge, mutants, made, show)
     print(
         f"\n{len(mutants)} defects, seed {requested.seed}, recorded at {record.commits[0][:12]}\n"
     )

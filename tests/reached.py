@@ -31,6 +31,8 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).resolve().parent.parent
 PARTS = "DRIVEPANEL_REACHED_PARTS"
 """The environment variable that names the folder for what each process has recorded."""
+AT_IMPORT = "at import"
+"""The name for all that runs before the first test."""
 _TEST = re.compile(r"(?:async )?def (test_\w+)\(")
 PYTEST = ("-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "tests.reached", "--timeout", "400")
 
@@ -68,6 +70,7 @@ class Recorder:
             include=[str(ROOT / "tui" / "*")], concurrency=["thread"],
         )  # fmt: skip
         self._coverage.start()
+        self._coverage.switch_context(AT_IMPORT)
 
     @pytest.hookimpl(wrapper=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> Generator[None, object, object]:
@@ -105,7 +108,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def record(copy: Path, commit: str, tests: Sequence[str], jobs: int) -> Record:
     """Run tests in a copy of the checkout and keep the lines that each reaches.
 
-    Named tests are added to what is recorded for the commit; none named: all are recorded again.
+    Named tests are added to what is recorded for the commit. With none named, all are recorded
+    again, and the records of other commits are deleted.
     """
     from coverage import CoverageData
 
@@ -115,9 +119,8 @@ def record(copy: Path, commit: str, tests: Sequence[str], jobs: int) -> Record:
     command = [sys.executable, *PYTEST, "-n", str(jobs), "--dist", "worksteal", *tests]
     subprocess.run(command, cwd=copy, env=environment, check=False)
     lines_file, tests_file = (folder() / f"{commit}.{name}" for name in ("lines", "json"))
-    if not tests:
-        lines_file.unlink(missing_ok=True)
-        tests_file.unlink(missing_ok=True)
+    for file in () if tests else (*folder().glob("*.lines"), *folder().glob("*.json")):
+        file.unlink()
     data = CoverageData(str(lines_file))
     for part in sorted(parts.glob("lines.*")):
         recorded = CoverageData(str(part))
@@ -170,7 +173,7 @@ class Record:
         }
 
     def lines(self, path: str) -> dict[int, set[str]]:
-        """By each line of a file as it is now: the tests that reach it."""
+        """By each line of a file as it is now: the tests that reach it, and AT_IMPORT."""
         if path not in self._lines:
             found = self._lines[path] = defaultdict(set)
             for commit in self.commits:
@@ -190,6 +193,8 @@ def _moved(commit: str) -> dict[str, str]:
 @cache
 def renamed(commit: str, name: str) -> str:
     """The present name of a test of a commit, its parameters included."""
+    if name == AT_IMPORT:
+        return name
     file, _, rest = name.partition("::")
     function, bracket, parameters = rest.partition("[")
     now, names = _renamed_in(commit, file)

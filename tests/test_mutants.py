@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import ast
+from contextlib import closing
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
+from types import FunctionType, SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from tests.defects.defect import Defect
 from tests.defects.equivalent import EQUIVALENT
+from tests.forked import Forks, Result
 from tests.mutants import DEFECTS, ROOT, STALE, SURVIVED, Stale, judge, place_of, planted
 from tests.mutator import KINDS, Defaults, Mutant, Mutator
 from tests.random_defects import (
@@ -26,6 +28,7 @@ from tests.random_defects import (
 )
 from tests.reached import Record, new_names, same_lines
 from tests.sources import PACKAGE, modules
+from tests.swapped import NotSwapped, swap
 
 WHOLE = "def half(x):\n    return x / 2\n"
 
@@ -248,6 +251,62 @@ def test_report_counts_defects_that_no_test_reaches_as_missed() -> None:
     assert rate(judged) == pytest.approx(1 / 3)
     assert "| bus | 4 | 1 | 1 | 1 | 1 | 33.3% |" in report(judged)
     assert rate([]) == 1.0
+
+
+SWAPPED = """
+LIMIT = 3
+
+class Pump:
+    def speed(self, by):
+        def twice():
+            return by * 2
+        return twice() + LIMIT
+
+def later(by=1):
+    return by
+"""
+
+
+def functions_of(source: str) -> list[FunctionType]:
+    names: dict[str, Any] = {}
+    exec(compile(source, "pump.py", "exec"), names)
+    return [names["Pump"].speed, names["later"]]
+
+
+def test_swap_gives_functions_the_code_of_the_changed_source() -> None:
+    speed, later = functions = functions_of(SWAPPED)
+    changed = SWAPPED.replace("by * 2\n", "by * \\\n 20\n")  # later lines move
+    assert swap(functions, "pump.py", SWAPPED, changed) == 1
+    assert (speed(None, 1), later()) == (23, 1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("LIMIT = 3", "LIMIT = 30"),
+        ("by=1", "by=10"),
+        ("    return by\n", "    pass\n" * 2 + "x = 1\n"),
+    ],
+)
+def test_swap_refuses_what_runs_at_import(old: str, new: str) -> None:
+    with pytest.raises(NotSwapped):
+        swap(functions_of(SWAPPED), "pump.py", SWAPPED, SWAPPED.replace(old, new))
+
+
+@pytest.mark.sweep
+def test_forks_name_the_first_test_that_fails_by_a_defect(tmp_path: Path) -> None:
+    (tmp_path / "pump.py").write_text("def speed():\n    return 1\n")
+    tests = "from pump import speed\ndef test_a(): pass\ndef test_b(): assert speed() == 1\n"
+    (tmp_path / "test_pump.py").write_text(f"{tests}def test_c(): assert speed() < 2\n")
+    names = [f"test_pump.py::test_{letter}" for letter in "abc"]
+    before, after = "def speed():\n    return 1\n", "def speed():\n    return 2\n"
+    with closing(Forks(tmp_path, ["test_pump.py"])) as forks:
+        assert forks.run(names, "pump.py", before, after) == Result(names[1], ran=2)
+        assert forks.run(names) == Result("", ran=3)
+        assert forks.run(["test_pump.py"], "pump.py", before, after).failed == names[1]
+        assert forks.run(names, "pump.py", before, "X = 1\n").not_swapped
+        hanging = before.replace("return 1", "import time; time.sleep(9)")
+        assert forks.run(names, "pump.py", before, hanging, 0.2).failed == names[1]
 
 
 def test_every_equivalent_defect_has_its_reason() -> None:
