@@ -76,8 +76,8 @@ class Forker:
         if not child:
             os.close(reads)
             os.setsid()
-            with os.fdopen(writes, "w") as told:
-                self._run(request, told)
+            with os.fdopen(writes, "w") as writer:
+                self._run(request, writer)
         os.close(writes)
         try:
             return self._followed(reads, request["seconds"])
@@ -103,7 +103,7 @@ class Forker:
             return Result(**json.loads(lines[-1]))
         return Result(lines[-1] if lines else HUNG, ran=len(lines))
 
-    def _run(self, request: dict[str, Any], told: IO[str]) -> None:
+    def _run(self, request: dict[str, Any], writer: IO[str]) -> None:
         """Run the tests in the fork, and end it."""
         ran = 0
         result = Result("")
@@ -114,24 +114,24 @@ class Forker:
             with tempfile.TemporaryDirectory(prefix="forked-") as folder:
                 factory = self._session.config._tmp_path_factory  # type: ignore[attr-defined]
                 factory._basetemp = Path(folder)
-                ran = self._run_tests(request["tests"], told)
+                ran = self._run_tests(request["tests"], writer)
             result = Result(self._failed, ran=ran)
         except NotSwapped as why:
             result = Result("", str(why))
         except BaseException as error:  # the fork must end here
             result = Result(self._failed, repr(error), ran)
         finally:
-            told.write(json.dumps(result._asdict()) + "\n")
-            told.flush()
+            writer.write(json.dumps(result._asdict()) + "\n")
+            writer.flush()
             os._exit(0)
 
-    def _run_tests(self, names: Sequence[str], told: IO[str]) -> int:
+    def _run_tests(self, names: Sequence[str], writer: IO[str]) -> int:
         """Run tests until the first one fails; return how many ran."""
         found = (self._of(name) if name.endswith(".py") else [name] for name in names)
         items = [self._items[name] for name in chain(*found) if name in self._items]
         for count, (item, following) in enumerate(zip_longest(items, items[1:]), 1):
-            told.write(item.nodeid.replace("\n", " ") + "\n")
-            told.flush()
+            writer.write(item.nodeid.replace("\n", " ") + "\n")
+            writer.flush()
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
             if self._failed:
                 return count
@@ -189,10 +189,7 @@ class Forks:
         os.close(requests)
         os.close(results)
         self._lines = os.fdopen(self._results)
-        if self._lines.readline() != "ready\n":
-            self._process.wait()
-            self._log.seek(0)
-            raise RuntimeError(self._log.read()[-3000:])
+        self._is_ready = False
 
     def run(
         self, tests: Sequence[str], path: str = "", before: str = "", after: str = "",
@@ -202,12 +199,22 @@ class Forks:
         request = {
             "tests": tests, "path": path, "before": before, "after": after, "seconds": seconds,
         }  # fmt: skip
+        self._await_ready()
         os.write(self._requests, json.dumps(request).encode() + b"\n")
         return Result(*json.loads(self._lines.readline()))
+
+    def _await_ready(self) -> None:
+        """Wait until the tests are collected; several processes may begin at the same time."""
+        if not self._is_ready and self._lines.readline() != "ready\n":
+            self._process.wait()
+            self._log.seek(0)
+            raise RuntimeError(self._log.read()[-3000:])
+        self._is_ready = True
 
     def close(self) -> None:
         """End the process."""
         os.close(self._requests)
         self._lines.close()
-        self._process.wait(10)
+        self._process.kill()
+        self._process.wait()
         self._log.close()

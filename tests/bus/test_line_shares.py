@@ -613,6 +613,71 @@ async def test_one_copy_of_a_write_is_its_reply_if_the_adapter_has_no_echo(
         assert sending.time_out == parts.devices.time_out(1, 3, Priority.STOP)
 
 
+@pytest.mark.parametrize(
+    ("kind", "repeat", "copy"),
+    [
+        (ResultKind.REPLY, True, True), (ResultKind.REPLY, False, False),
+        (ResultKind.EXCEPTION, True, False), (ResultKind.NOTHING, True, False),
+    ],
+)  # fmt: skip
+def test_only_a_reply_like_the_last_one_may_be_a_copy(
+    kind: ResultKind, repeat: bool, copy: bool
+) -> None:
+    parts, job = Parts(), job_of()
+    compared: list[tuple[Any, ...]] = []
+
+    def is_repeat(*those: Any) -> bool:
+        compared.append(those)
+        return repeat
+
+    cast(Any, parts.devices).is_repeat = is_repeat
+    result = replied()
+    result.kind = kind
+    assert parts.here._may_be_copy(job, result) is copy
+    assert compared == [(1, job.pdu, VALUE, 0.05)] * (kind is ResultKind.REPLY)
+
+
+@pytest.mark.parametrize(
+    ("request_", "form", "waited", "waits"),
+    [
+        (Read(1, 100, 1), False, False, False), (Read(1, 100, 1), True, False, True),
+        (Read(1, 100, 1), False, True, True), (WriteOne(0, COMMAND, 7), False, False, False),
+    ],
+)  # fmt: skip
+def test_end_of_an_exchange_is_noted_by_each_part(
+    request_: Request, form: bool, waited: bool, waits: bool
+) -> None:
+    parts = Parts()
+    here, job, result = parts.here, job_of(request=request_), replied()
+    noted: list[tuple[Any, ...]] = []
+
+    def note(name: str, back: object = None) -> Any:
+        def called(*those: Any) -> object:
+            noted.append((name, *those))
+            return back
+
+        return called
+
+    outcomes, steps = cast(Any, here._outcomes), cast(Any, here.steps)
+    outcomes.hear_gateway, outcomes.record = note("gateway"), note("record")
+    steps.note, steps.end_form = note("step"), note("form", form)
+    cast(Any, here._back_to_back).count = note("count")
+    cast(Any, here.proof).sent = note("sent")
+    outcomes.waited_for_us = note("waited", waited)
+    cast(Any, here)._end = note("end")
+    here._conclude(job, result, 99.5)
+    expected = [
+        ("gateway", job, result), ("record", job.request.device, job.pdu, result, job),
+        ("step", job, job.expectation, result), ("count", job, 99.5, 100.0), ("sent", job, 99.5),
+        ("form", job, result), ("waited", job, result), ("end", job, result),
+    ]  # fmt: skip
+    left_out = {"step"} if job.expectation is None else set()
+    left_out |= {"end"} if waits else set()
+    left_out |= {"waited"} if form else set()
+    assert noted == [entry for entry in expected if entry[0] not in left_out]
+    assert here.take_all() == ([job] if waits else [])
+
+
 @pytest.mark.parametrize("second", [VALUE, bytes([3, 2, 0, 8])])
 async def test_reply_that_may_be_a_copy_is_requested_once_more(second: bytes) -> None:
     parts, job = Parts(replied(second)), job_of()

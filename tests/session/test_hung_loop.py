@@ -107,6 +107,7 @@ class Watched:
         self.now = 0.0
         self.sent: list[tuple[object, ...]] = []
         self.then: dict[float, Callable[[], object]] = {}
+        self.threads: list[dict[str, object]] = []
         self._monkeypatch = monkeypatch
         self.line = FakeLine()
         if voice:
@@ -117,7 +118,8 @@ class Watched:
     def stop_directly(self, devices: tuple[int, ...]) -> None:
         self.sent.append((round(self.now, 2), "directly", *devices))
 
-    def _thread(self, *, target: Callable[[], None], **_: object) -> SimpleNamespace:
+    def _thread(self, *, target: Callable[[], None], **how: object) -> SimpleNamespace:
+        self.threads.append(how)
         return SimpleNamespace(start=target)
 
     def monotonic(self) -> float:
@@ -176,7 +178,9 @@ def test_stop_that_was_sent_or_replaced_is_watched_no_longer(
     here.then[0.1] = lambda: setattr(work.stop, how, True)
     assert here.watch(work) == []
     assert here.now == 0.15
+    assert here.threads == [{"name": "stops sent", "daemon": True}]
     assert here.watch() == []
+    assert len(here.threads) == 1, "a key that is held down starts no thread for each repeat"
 
 
 def test_stop_that_does_not_begin_on_a_lost_line_waits_for_the_line(

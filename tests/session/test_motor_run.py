@@ -43,6 +43,9 @@ class Rig:
         self.hertz: float | None = 20.0
         self.error = ""
         self.cycle = 0
+        self.prepared = 0
+        self.ahead = 0.01
+        """Seconds from a moment to the cycle that is the latest one then."""
         self.sent: list[Any] = []
         self.learned = True
         self.work = SimpleNamespace(stops=3, stopped_by="")
@@ -85,9 +88,11 @@ class Rig:
 
     async def _prepare(self) -> None:
         assert not self.run.may_turn
+        self.prepared += 1
 
     async def _command(self) -> None:
         assert self.run.may_turn, "its frame may be on the way"
+        assert self.prepared == 1
         self.journal("run forward")
 
     def journal(self, why: str, device: int = 1) -> None:
@@ -114,7 +119,11 @@ class Rig:
         now = self.states.pop(0) if len(self.states) > 1 else self.states[0]
         readings = {} if self.hertz is None else {"HZ": SimpleNamespace(number=self.hertz)}
         return SimpleNamespace(
-            cycle=self.cycle, time=self.now + 0.01, state=now, error=self.error, readings=readings
+            cycle=self.cycle,
+            time=self.now + self.ahead,
+            state=now,
+            error=self.error,
+            readings=readings,
         )
 
     def _stop(self, sessions: list[Any], *, by: str) -> None:
@@ -359,6 +368,47 @@ async def test_lost_line_is_reported_once_and_the_stop_sent_when_it_returns(
         ]
         * 2
     )
+
+
+@pytest.mark.parametrize(("ahead", "bad"), [(-0.01, False), (0.0, False), (0.01, True)])
+async def test_line_was_bad_if_its_error_is_newer_than_the_stop(
+    ahead: float, bad: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = Rig(monkeypatch)
+    rig.ahead, rig.error = ahead, "no answer"
+    rig.after_sleep = lambda: setattr(rig, "error", "")
+    assert await rig.run._line_was_bad(1000.0) is bad
+    assert len(rig.warned) == bad
+    assert rig.now == pytest.approx(1000.05)
+
+
+async def test_drive_answers_if_its_cycle_is_newer_than_the_question(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = Rig(monkeypatch)
+    rig.ahead = 0.0
+    assert not await rig.run._line_was_bad(900.0)
+    assert rig.now == pytest.approx(1000.05), "the cycle of before proves nothing"
+
+
+async def test_command_that_was_refused_leaves_no_command_on_its_way(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = Rig(monkeypatch)
+    assert not rig.run.may_turn
+    await rig.run._start()
+    assert rig.run._commanding is False
+    assert rig.run.may_turn, "it is in the journal"
+    rig.fleet.journal.sent = ()
+
+    async def refused() -> None:
+        assert rig.run._commanding
+        raise LineError("refused")
+
+    rig.run.command = refused
+    with pytest.raises(LineError):
+        await rig.run._start()
+    assert rig.run._commanding is False
 
 
 # -- the preparation -------------------------------------------------------------------------------

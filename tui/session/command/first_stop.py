@@ -93,7 +93,7 @@ def unlike_families(session: DriveSession) -> tuple[StopProfile, ...]:
     """Return the candidate families of a guessed drive if no one stop word stops them all."""
     ids = session.known_identity.candidates if session.guessed else ()
     profiles = [library.load(id_) for id_ in ids]
-    if not profiles or stop_alike(profiles):
+    if stop_alike(profiles):
         return ()
     return tuple(stop_profile_of(profile, names_itself=False) for profile in profiles)
 
