@@ -55,6 +55,39 @@ def test_every_family_has_its_sections(family: str) -> None:
     assert ("Signal names" in titles) is (family in ALTIVAR)
 
 
+# the manuals' tables of accessories, by family
+NUMBERS = [
+    "LU9GC3", "VW3A8306TF03", "VW3A8306TF10", "VW3A8306RC", "VW3A8306R", "VW3A8306D30",
+    "VW3A8306R03", "VW3A8306R10", "VW3A8306R30", "TSXCSA100", "TSXCSA200", "TSXCSA500",
+    "TSXSCA50", "TSXSCA62", "VW3A8306", "TWDXCARJ030", "TSXSCPCM4030", "TSXSCYCM6030",
+    "VW3P07306R10", "TSXSCA72", "TSXPACC01", "TSXSCPCU4030",
+]  # fmt: skip
+OWN_NUMBERS = {
+    "atv21": [*NUMBERS, "TSXETG100", "VW3A3303"],
+    "atv31": [*NUMBERS, "174CEV30010"],
+    "atv312": ["TSXCSA100", "TSXCSA200", "TSXCSA500", "VW3A8200"],
+    "atv71": [*NUMBERS, "174CEV30010", "VW3A8306DRC", "VW3A8306DR", "TSXSCPCU4530", "TSXSCYCU4530"],
+}
+
+
+@pytest.mark.parametrize("family", OWN_NUMBERS)
+def test_page_has_every_catalog_number_of_the_manual(family: str) -> None:
+    page = "\n".join(text_of(family, title) for title in ("Parts to order", "Cables by master"))
+    words = page.replace(" ", "")
+    assert [number for number in OWN_NUMBERS[family] if number not in words] == []
+
+
+def test_masters_of_one_manual_are_not_those_of_another() -> None:
+    assert "174 CEV 300 10" not in text_of("atv21", "Cables by master")
+    assert "TSX ETG 100" not in text_of("atv71", "Cables by master")
+    assert "SUB-D: " not in text_of("atv31", "Cables by master")
+    assert not text_of("powerdrive", "Parts to order")
+
+
+def test_keypad_functions_without_an_address_are_named() -> None:
+    assert [row.head for row in section("atv21", "On the keypad only").rows] == ["AUH", "AUF"]
+
+
 @pytest.mark.parametrize("family", FAMILIES)
 def test_page_has_every_pin_rule_command_and_erratum(family: str) -> None:
     data = library.load(family).data

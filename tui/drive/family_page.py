@@ -68,10 +68,13 @@ def family_page(profile: Profile) -> list[PageSection]:
         *(PageSection(f"Pins: {c.name}", tuple(_pins(c))) for c in data.connectors),
         PageSection("Signal names", tuple(_signals(data))),
         PageSection("Line", tuple(_line(data))),
+        PageSection("Parts to order", tuple(_parts(data))),
+        PageSection("Cables by master", tuple(_masters(data))),
         PageSection("Addresses", tuple(_addresses(data))),
         PageSection("On a communication loss", tuple(_silence(data))),
         PageSection("After a fault reset", tuple(_after_reset(data))),
         PageSection("Lamps and display", tuple(_lamps(data))),
+        PageSection("On the keypad only", tuple(_keypad_functions(data))),
         PageSection("Command words", tuple(_commands(data))),
         PageSection("Errors in the manuals", tuple(_errata(data))),
     ]
@@ -154,6 +157,29 @@ def _line(data: ProfileData) -> Iterator[PageRow]:
         yield PageRow("", link.note)
     for rule in data.line_rules:
         yield PageRow(rule.subject, rule.rule)
+
+
+def _parts(data: ProfileData) -> Iterator[PageRow]:
+    for part in data.parts:
+        yield PageRow(part.number, part.text, SURENESS[part.confidence])
+
+
+_WAYS = {"rj45": "RJ45", "boxes": "Screw terminals", "sub_d": "SUB-D"}
+"""By the field of a master, the name of its way to build the line."""
+
+
+def _masters(data: ProfileData) -> Iterator[PageRow]:
+    for master in data.masters:
+        head = master.name
+        for field, way in _WAYS.items():
+            if cable := getattr(master, field):
+                yield PageRow(head, f"{way}: {cable}", SURENESS[master.confidence])
+                head = ""
+
+
+def _keypad_functions(data: ProfileData) -> Iterator[PageRow]:
+    for function in data.keypad_functions:
+        yield PageRow(function.code, function.text, SURENESS[function.confidence])
 
 
 def _addresses(data: ProfileData) -> Iterator[PageRow]:

@@ -36,6 +36,8 @@ ROW_KEYS: Mapping[TomlPath, str] = {
     ("signal_paths",): "id",
     ("start_up",): "step",
     ("connectors",): "name",
+    ("parts",): "number",
+    ("masters",): "name",
     ("groups",): "name",
     ("enumerations",): "id",
     ("parameters",): "code",

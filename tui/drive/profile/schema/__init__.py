@@ -112,7 +112,16 @@ from .whole import (
     StartUpStep,
     Way,
 )
-from .wiring import FamilyWarning, Lamp, Opening, SignalName, Wiring
+from .wiring import (
+    CablingMaster,
+    CablingPart,
+    FamilyWarning,
+    KeypadFunction,
+    Lamp,
+    Opening,
+    SignalName,
+    Wiring,
+)
 
 __all__ = [
     "Access",
@@ -123,6 +132,8 @@ __all__ = [
     "BitNumber",
     "Block",
     "BlockChoice",
+    "CablingMaster",
+    "CablingPart",
     "CauseRule",
     "ChannelBits",
     "ChannelRow",
@@ -160,6 +171,7 @@ __all__ = [
     "Identifier",
     "InputBits",
     "Interlock",
+    "KeypadFunction",
     "Lamp",
     "LineRule",
     "LinkChoice",

@@ -23,7 +23,7 @@ from .link import (
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter, ParameterGroup
 from .signal_path import SignalPath
-from .wiring import Wiring
+from .wiring import CablingMaster, CablingPart, KeypadFunction, Wiring
 
 
 class StartUpStep(Table, frozen=True, kw_only=True):
@@ -164,6 +164,9 @@ class ProfileData(Table, frozen=True, kw_only=True):
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
     wiring: Wiring = Wiring()
+    parts: list[CablingPart] = []
+    masters: list[CablingMaster] = []
+    keypad_functions: list[KeypadFunction] = []
     groups: list[ParameterGroup] = []
     enumerations: list[Enumeration] = []
     parameters: list[Parameter]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal
 
 from msgspec import Meta
 
@@ -59,3 +59,41 @@ class Wiring(Table, frozen=True, kw_only=True):
     """Source of those names."""
     lamps: list[Lamp] = []
     """Lamps and display symbols."""
+
+
+class CablingPart(Table, frozen=True, kw_only=True):
+    """A part for the line, by its catalog number."""
+
+    number: str
+    """Catalog number, with the spaces that its manufacturer prints."""
+    use: Literal["box", "terminator", "cable", "other"]
+    """Its place in the line."""
+    text: str
+    """Length, ends and what it is for."""
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class CablingMaster(Table, frozen=True, kw_only=True):
+    """The cable from a kind of master to the line, by the two ways to build a line."""
+
+    name: str
+    rj45: str = ""
+    """Cable to splitter blocks and T-junction boxes for RJ45."""
+    boxes: str = ""
+    """Cable to junction boxes with screw terminals."""
+    sub_d: str = ""
+    """Cable to junction boxes with SUB-D sockets."""
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class KeypadFunction(Table, frozen=True, kw_only=True):
+    """A function of the keypad that has no address on the line."""
+
+    code: str
+    """Its name on the keypad."""
+    text: str
+    """Its purpose, values and factory setting."""
+    source: str = ""
+    confidence: Confidence = "manual"
