@@ -46,6 +46,7 @@ from tui.bus.share.messages import (
 )
 from tui.bus.share.requested import OWNER_ENDED, PendingRequests
 from tui.bus.shared_state import SharedState
+from tui.bus.written import DeviceWritten
 
 from .conftest import WIDE
 
@@ -249,6 +250,8 @@ def test_stop_given_while_no_owner_was_heard_is_reported(again: bool, gone: bool
 def test_messages_about_control_and_notices_are_events() -> None:
     here = Hearing()
     assert here.hear(Notified(3, "A notice.")) == [NoticeReceived(3, "A notice.")]
+    written = DeviceWritten(3, 9001, (30,), OTHER, 5.0)
+    assert here.hear(written) == [written]
     assert here.hear(Alive()) == []
     denied = [
         event for event in here.hear(RequestDenied(1, OTHER)) if isinstance(event, ControlDenied)

@@ -17,6 +17,7 @@ from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import DeviceException, LineBusy, NoAnswer, RequestRefused
 from tui.bus.line_events import ControlAnswered, ControlDenied, ControlRequested
 from tui.bus.share.place import SharePlace
+from tui.bus.written import DeviceWritten
 from tui.wire.frames import frame
 
 from .conftest import Share
@@ -52,6 +53,38 @@ async def test_attached_program_can_send_every_request(share: Share) -> None:
         assert "Shared with panel" in other.state.reason
         assert [program.name for program in owner.facts.others] == ["backup"]
         assert other.state.status is LineStatus.CONNECTED
+
+
+async def test_write_is_reported_to_all_programs_before_a_later_reply(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        programs = [lines.open(name) for name in ("panel", "run", "watch")]
+        owner, run, watch = programs
+        reported: list[list[DeviceWritten]] = [[], [], []]
+        for program, found in zip(programs, reported, strict=True):
+            await program.read(1, 1)
+            on_event(program.facts, DeviceWritten, found.append)
+        await run.write(1, 50, [7])
+        await asyncio.gather(*(program.read(1, 50) for program in (owner, watch)))
+        assert [[(w.device, w.words) for w in found] for found in reported] == [[(1, {50: 7})]] * 3
+        await owner.write(2, 60, [8, 9])
+        await run.read_write(1, 60, 1, 61, [9])
+        await watch.read(1, 50)
+        assert [write.program.name for write in reported[2]] == ["run", "panel", "run"]
+        assert [write.words for write in reported[2]] == [{50: 7}, {60: 8, 61: 9}, {61: 9}]
+
+
+async def test_refused_write_is_not_reported(share: Share) -> None:
+    def refuses(request: bytes, _count: int) -> Sequence[Step]:
+        return [frame(request[0], bytes([request[1] | 0x80, 2]))]
+
+    with PtyPeer(refuses) as peer:
+        lines = share(peer.path)
+        reported: list[DeviceWritten] = []
+        on_event(lines.open("panel").facts, DeviceWritten, reported.append)
+        with pytest.raises(DeviceException):
+            await lines.open("run").write(3, 700, [1])
+        assert reported == []
 
 
 async def test_exception_of_a_drive_reaches_the_sender(share: Share) -> None:

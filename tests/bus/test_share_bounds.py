@@ -54,6 +54,7 @@ from tui.bus.share.place import Owner
 from tui.bus.shared_state import SharedState
 from tui.bus.stop_counts import StopCounts, is_newer
 from tui.bus.trace import Frame
+from tui.bus.written import DeviceWritten
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest
@@ -331,6 +332,7 @@ SAMPLES: tuple[AnyMessage, ...] = (
     RequestGranted(5, "stranger", True, "why"),
     PollPause(5, "a test of its timeout"),
     Notified(5, "text"),
+    DeviceWritten(5, 3201, (1, 65535), STRANGER, 5.0),
     PollWish({1: 0.2}, True),
     Facts((STRANGER,), {5: "stranger"}, {5: {"stranger": 1}}, {6: ("stranger", "why")}, {5: 1.0}),
     News(

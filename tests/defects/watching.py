@@ -197,4 +197,20 @@ DEFECTS = (
         "A drive whose reaction is off is shown as one that trips.",
         ("tests/session/test_timeout.py",),
     ),
+    Defect(
+        "start-of-another-source-credited-to-a-program",
+        "tui/session/monitor/trend.py",
+        "if cycle.time - item.time <= COMMAND_REACH]",
+        "if cycle.time - item.time <= 60 * COMMAND_REACH]",
+        "A start by the terminals is shown as caused by a program that commanded a minute before.",
+        ("tests/session/test_trend_marks.py",),
+    ),
+    Defect(
+        "write-credited-to-the-reader",
+        "tui/bus/schedule/outcomes.py",
+        "(program := known.get(job.program or self._facts.me.id))",
+        "(program := known.get(self._facts.me.id))",
+        "The curve names another program than the one that wrote a setting.",
+        ("tests/bus/test_share.py",),
+    ),
 )

@@ -9,16 +9,20 @@ from pathlib import Path
 import pytest
 
 from tests.limits import WAS_OFF
+from tests.line_events import on_event
 from tests.session.fake_clock import FakeClock
 from tests.sweeps import kept
+from tests.ui import fakes
 from tui.bus.fake import FakeLine
 from tui.bus.line import Timing
+from tui.bus.written import DeviceWritten
 from tui.drive.errors import ValueRefused
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import dump_set
 from tui.drive.settings.selection import FILTERS, rows
 from tui.drive.settings.set_file import read_set, write_file
 from tui.session.drive import DriveSession
+from tui.session.monitor.trend import Trend
 from tui.session.read.upload import Upload
 from tui.session.reading import reading_of
 from tui.session.settings.editor import Editor
@@ -91,15 +95,21 @@ async def test_selected_parameters_are_read_first(family: str) -> None:
             rows(editor.facts, chosen, "a")
 
 
-async def test_only_edits_that_were_sent_are_counted_for_the_curve() -> None:
+async def test_only_edits_that_were_sent_are_marked_in_the_curve() -> None:
     async with editing("atv71") as (made, editor):
+        trend = Trend(editor.session.profile)
+        leave = on_event(made.line.facts, DeviceWritten, trend.note_write)
+        trend.add(fakes.snapshot_of(editor.session.profile, fakes.READY))
         await read(made, editor, "ACC", "DEC")
         editor.staging.stage("ACC", "5")
         editor.staging.stage("DEC", "7")
         made.drive.set("ACC", 50)
         editor.apply()
         assert await written(made, editor) == "Wrote 1, all verified. Already held: 1."
-        assert made.session.edits_written == 1
+        leave()
+        point = trend.add(fakes.snapshot_of(editor.session.profile, fakes.READY))
+        assert (point.mark, point.by) == ("write", (made.line.facts.me.text,))
+        assert point.codes == ("DEC",)
 
 
 async def test_refused_edit_stays_staged_with_its_reason() -> None:

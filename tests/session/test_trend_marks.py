@@ -2,15 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import msgspec
 import pytest
 
 from tests.ui import fakes
+from tui.bus.program import Program
+from tui.bus.written import DeviceWritten
 from tui.drive.profile import library
 from tui.session.monitor.snapshot import Snapshot
-from tui.session.monitor.trend import TREND_MARKS, Trend, TrendMarker, TrendPoint, readout_parameter
+from tui.session.monitor.trend import (
+    COMMAND_REACH,
+    TREND_MARKS,
+    Trend,
+    TrendMarker,
+    TrendPoint,
+    readout_parameter,
+)
 
 ATV71 = library.load("atv71")
 READY, RUNNING, FAULT = (
@@ -22,7 +32,7 @@ LOST = replace(READY, error="Device 2 did not answer.")
 def marks(*snapshots: Snapshot) -> list[str]:
     """The mark of each cycle, with a reference that never changes."""
     marker = TrendMarker()
-    return [marker.mark(snapshot, 50.0, 0) for snapshot in snapshots]
+    return [marker.mark(snapshot, 50.0).mark for snapshot in snapshots]
 
 
 @pytest.mark.parametrize(
@@ -57,23 +67,55 @@ def test_only_a_step_of_a_steady_reference_is_marked(
     references: list[float | None], expected: list[str]
 ) -> None:
     marker = TrendMarker()
-    assert [marker.mark(RUNNING, reference, 0) for reference in references] == expected
+    assert [marker.mark(RUNNING, reference).mark for reference in references] == expected
 
 
-def test_edit_is_marked_and_a_trip_matters_more() -> None:
-    marker = TrendMarker()
-    found = [
-        marker.mark(snapshot, 50.0, edits)
-        for snapshot, edits in ((RUNNING, 0), (RUNNING, 2), (RUNNING, 2), (FAULT, 3), (FAULT, 3))
-    ]
-    assert found == ["", "write", "", "trip", ""]
+def written(address: int, *values: int, by: str = "run", time: float = 100.0) -> DeviceWritten:
+    return DeviceWritten(2, address, values, Program(by, by, 7), time)
 
 
-def test_edit_during_a_lost_cycle_is_marked_afterwards() -> None:
-    marker = TrendMarker()
-    cycles = ((RUNNING, 0), (LOST, 1), (RUNNING, 1), (RUNNING, 1))
-    found = [marker.mark(snapshot, 50.0, edits) for snapshot, edits in cycles]
-    assert found == ["", "lost", "write", ""]
+ACC, CMD, LFR = (ATV71[code].address for code in ("ACC", "CMD", "LFR"))
+
+
+def points(*steps: tuple[Snapshot, Sequence[DeviceWritten]]) -> list[TrendPoint]:
+    """The points of cycles 0.5 s apart, each with the writes before it."""
+    trend = Trend(ATV71)
+    found = []
+    for number, (snapshot, writes) in enumerate(steps):
+        for write in writes:
+            trend.note_write(write)
+        found.append(trend.add(replace(snapshot, time=100.0 + number / 2)))
+    return found
+
+
+def test_write_of_any_program_is_marked_with_its_program_and_a_trip_matters_more() -> None:
+    both = [written(ACC, 30), written(ACC + 1, 40, by="panel"), written(65000, 1, by="panel")]
+    found = points((RUNNING, []), (RUNNING, both), (RUNNING, []), (FAULT, both), (FAULT, []))
+    assert [point.mark for point in found] == ["", "write", "", "trip", ""]
+    assert found[1].by == ("run (pid 7)", "panel (pid 7)")
+    assert found[1].codes == ("ACC", "DEC", "register 65000")
+    assert found[3].by == found[3].codes == ()
+
+
+def test_write_during_a_lost_cycle_is_marked_afterwards() -> None:
+    found = points((RUNNING, []), (LOST, [written(ACC, 30)]), (RUNNING, []), (RUNNING, []))
+    assert [point.mark for point in found] == ["", "lost", "write", ""]
+    assert found[2].codes == ("ACC",)
+
+
+def test_start_names_the_program_of_a_command_shortly_before_it() -> None:
+    found = points((READY, []), (RUNNING, [written(CMD, 15)]))
+    assert (found[1].mark, found[1].by, found[1].codes) == ("start", ("run (pid 7)",), ())
+    late = points((READY, []), (RUNNING, [written(CMD, 15, time=100.5 - COMMAND_REACH - 0.1)]))
+    assert (late[1].mark, late[1].by) == ("start", ())
+    assert points((READY, []), (READY, [written(CMD, 15), written(LFR, 300)]))[1].mark == ""
+
+
+def test_event_names_the_last_programs_that_commanded_and_no_setting() -> None:
+    writes = [written(CMD, 15, by=by) for by in ("one", "two", "three", "two")]
+    found = points((RUNNING, []), (READY, [*writes, written(ACC, 30, by="four")]))
+    assert (found[1].mark, found[1].by) == ("stop", ("three (pid 7)", "two (pid 7)"))
+    assert found[1].codes == ()
 
 
 def test_mark_is_kept_with_its_point_and_for_the_next_program() -> None:
@@ -82,6 +124,7 @@ def test_mark_is_kept_with_its_point_and_for_the_next_program() -> None:
     point = trend.add(replace(RUNNING, time=READY.time + 1))
     assert point.mark == "start"
     assert trend.points[-1] == point
+    point = replace(point, by=("run",), codes=("ACC",))
     sent = msgspec.msgpack.encode([point])
     assert msgspec.msgpack.decode(sent, type=list[TrendPoint]) == [point]
     before = msgspec.msgpack.encode([{"time": 1.0, "values": (1.0, None, 2.0)}])

@@ -284,6 +284,33 @@ def test_mark_without_room_below_is_explained_above() -> None:
     assert " trip " in heading.plain
 
 
+@pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])
+def test_cursor_on_a_mark_names_the_program_that_caused_it(size: tuple[int, int]) -> None:
+    room, base = arrange(*size, 9), replace(running_view(1000.0), apart=0.0, me="panel (pid 1)")
+    settings = tuple(f"S{number}" for number in range(4))
+    for at, mark, by, codes, cause in (
+        (950.0, "write", ("run (pid 7)",), ("ACC", "DEC"), "write of ACC, DEC by run (pid 7)"),
+        (970.0, "write", ("panel (pid 1)",), settings, "write of 4 settings by this panel"),
+        (999.5, "start", ("run (pid 7)",), (), "start after a command of run (pid 7)"),
+        (960.0, "stop", ("a", "panel (pid 1)"), (), "stop after a command of a and this panel"),
+    ):
+        point = TrendPoint(at, (1.0, 1.0, 1.0), mark, by, codes)
+        trend = sorted((*base.trend, point), key=lambda item: item.time)
+        view = replace(base, trend=tuple(trend), page=page_start(at, base.step), cursor=at)
+        rows = curve_lines(view, room)
+        assert f" {cause} " in rows[-1].plain
+        assert rows[-1].cell_len <= size[0]
+        other = curve_lines(replace(view, cursor=at - 5.0), room)[-1].plain
+        assert by[0] not in other
+
+
+def test_mark_without_a_known_cause_claims_none() -> None:
+    view = marked_at(running_view(1000.0), {970.0: "start"})
+    room = arrange(80, 24, 9)
+    at_mark = curve_lines(replace(view, page=view.page_start, cursor=970.0), room)[-1].plain
+    assert at_mark == curve_lines(view, room)[-1].plain
+
+
 def test_most_urgent_of_several_marks_in_a_cell_is_shown() -> None:
     marks = {990.0: "reference", 990.5: "trip", 995.0: "unknown to us"}
     axis = curve_lines(marked_at(running_view(1000.0), marks), arrange(60, 16, 9))[-1].plain

@@ -11,6 +11,7 @@ import msgspec
 from msgspec.structs import force_setattr
 
 from .program import Program, readable
+from .written import DeviceWritten
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -105,6 +106,7 @@ class NoteReceived(msgspec.Struct, frozen=True):
 LineEvent = (
     StateChanged | ProgramsChanged | NoticeReceived | DevicesStopped | ControlDenied
     | ControlRequested | ControlAnswered | ProgramLost | WriteAbandoned | StopDue | NoteReceived
+    | DeviceWritten
 )  # fmt: skip
 
 

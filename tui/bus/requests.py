@@ -61,6 +61,11 @@ class Request(ABC):
         """True if the request changes anything in the device; such a request is sent once."""
         return False
 
+    @property
+    def written(self) -> tuple[int, tuple[int, ...]]:
+        """The first register that the request writes, and the words; no words if it writes none."""
+        return 0, ()
+
     def words(self, _pdu: bytes) -> tuple[int, ...]:
         """The registers in a checked reply; none if the function reads none."""
         return ()
@@ -127,6 +132,10 @@ class WriteOne(Request):
         return self.address
 
     @property
+    def written(self) -> tuple[int, tuple[int, ...]]:
+        return self.address, (self.value,)
+
+    @property
     def changes(self) -> bool:
         return True
 
@@ -150,6 +159,10 @@ class WriteMany(Request):
     @property
     def register(self) -> int:
         return self.address
+
+    @property
+    def written(self) -> tuple[int, tuple[int, ...]]:
+        return self.address, self.values
 
     @property
     def changes(self) -> bool:
@@ -183,6 +196,10 @@ class ReadWrite(Request):
     @property
     def register(self) -> int:
         return self.address
+
+    @property
+    def written(self) -> tuple[int, tuple[int, ...]]:
+        return self.write_address, self.values
 
     @property
     def changes(self) -> bool:

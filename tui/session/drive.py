@@ -97,8 +97,6 @@ class DriveSession:
         """Records of its motor's starts; None if they are not kept."""
         self.rest_seen = -math.inf
         """When it was last read in a state other than running or stopping (session's clock)."""
-        self.edits_written = 0
-        """Number of settings that edits of this program have written to it."""
         self.full_reads_requested = 0
         """Number of requests to re-read every value."""
         line.describe(device, limits_of(profile))

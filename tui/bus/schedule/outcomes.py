@@ -26,6 +26,7 @@ from ..model import Priority, Reply, Timing
 from ..requests import BROADCAST
 from ..shared_state import SharedState
 from ..tally import Tally
+from ..written import DeviceWritten
 from .patience import Devices
 from .queue import Job
 from .shared_values import SharedValues
@@ -99,6 +100,7 @@ class Outcomes:
         request, now = job.request, self._clock()
         if job.expectation is None:
             self.note_strays(result.strays, result.end)
+            self._report_write(job, result.sent)
             return job.reply(b"", result.sent)
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._count_good(request.device, result, now)
@@ -114,6 +116,7 @@ class Outcomes:
             case ResultKind.REPLY:
                 reply = job.reply(result.pdu, self._time_of(job, result))
                 self._share(job, reply)
+                self._report_write(job, result.end)
                 return reply
             case ResultKind.EXCEPTION:
                 self._tally.count_exception(request.device, result.exception)
@@ -177,6 +180,16 @@ class Outcomes:
         """
         if len(self._facts.programs) > 1 or job.max_age:
             self.values.note(job.request, reply.words, reply.time)
+
+    def _report_write(self, job: Job, time: float) -> None:
+        """Report registers that were written, with their program."""
+        address, values = job.request.written
+        if not values:
+            return
+        known = {item.id: item for item in (*self._facts.departed, *self._facts.programs)}
+        if (program := known.get(job.program or self._facts.me.id)) is not None:
+            written = DeviceWritten(job.request.device, address, values, program, max(0.0, time))
+            self._facts.events.emit(written)
 
     @staticmethod
     def _time_of(job: Job, result: ExchangeResult) -> float:

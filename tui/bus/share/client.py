@@ -15,6 +15,7 @@ from ..line_events import (
     ControlDenied,
     ControlRequested,
     DevicesStopped,
+    LineEvent,
     NoteReceived,
     NoticeReceived,
 )
@@ -23,6 +24,7 @@ from ..model import LineState, LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from ..shared_state import LinePublisher, SharedState, commanded_by
+from ..written import DeviceWritten
 from .carried import Polled, error_from
 from .heartbeat import Heartbeat
 from .messages import (
@@ -291,10 +293,8 @@ class ShareClient:
                 self._news.hear(message)
             case Facts():
                 self._hear_facts(message)
-            case Notified(device=device, text=text):
-                facts.events.emit(NoticeReceived(device, text))
-            case LineNote():
-                facts.events.emit(NoteReceived(message))
+            case Notified() | LineNote() | DeviceWritten():
+                facts.events.emit(_event_of(message))
             case StopGiven(devices=devices, by=by, program=program) if program.id != facts.me.id:
                 counts, who = message.counts, f"{by}, {program.text}"
                 facts.stops.note(program.id, devices, counts, who, message.when)
@@ -335,6 +335,15 @@ class ShareClient:
             self.writer.write(packed(message))
             if is_stop(message):
                 self.watching.note_stop()
+
+
+def _event_of(message: Notified | LineNote | DeviceWritten) -> LineEvent:
+    match message:
+        case Notified(device=device, text=text):
+            return NoticeReceived(device, text)
+        case LineNote():
+            return NoteReceived(message)
+    return message
 
 
 def _report_own(facts: SharedState, send: Callable[[AnyMessage], None]) -> None:

@@ -38,9 +38,10 @@ from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priori
 from ..notes import LineNote
 from ..program import Program
 from ..trace import Frame
+from ..written import DeviceWritten
 from .carried import ErrorForm, Polled, Subscribe, Unsubscribe
 
-VERSION = 9
+VERSION = 10
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; a longer message is invalid."""
@@ -263,7 +264,7 @@ AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
     | Alive | Pulse | Claim | RequestDenied | DriveRequested | RequestGranted | Notified | PollPause
     | PollWish | Facts | News | Goodbye | Armed | LineNote | KeepAlive | Subscribe
-    | Unsubscribe | Polled
+    | Unsubscribe | Polled | DeviceWritten
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

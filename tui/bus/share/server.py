@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Callable
 from contextlib import suppress
 
 from ..limits import CAUTIOUS
-from ..line_events import DevicesStopped, NoteReceived, NoticeReceived, StopDue
+from ..line_events import DevicesStopped, LineEvent, NoteReceived, NoticeReceived, StopDue
 from ..link import label
 from ..notes import LineNote
 from ..program import Program
@@ -15,6 +16,7 @@ from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
 from ..schedule.queue import Job
 from ..shared_state import LinePublisher
+from ..written import DeviceWritten
 from .attached import Client
 from .carried import Subscribe, Unsubscribe
 from .commanding import Commanding
@@ -60,12 +62,14 @@ class ShareServer:
         self._handling: set[asyncio.Task[None]] = set()
         self._stops_left: list[Job] = []
         self._coming_back: asyncio.Task[None] | None = None
+        self._end_passing_on: Callable[[], None] = lambda: None
 
     async def start(self) -> None:
         """Listen. Raises OSError if no socket can be made."""
         facts = self._inside.facts
         facts.set_programs((facts.me,))
         facts.voice = LinePublisher(self._say)
+        self._end_passing_on = facts.events.subscribe(self._pass_on)
         await self._listening.start()
         self._signs.start()
         self._miss_departed(ended=True)
@@ -74,6 +78,7 @@ class ShareServer:
     async def close(self) -> None:
         """Stop listening, and remove the socket; the programs start the next keeper."""
         self._inside.facts.voice = None
+        self._end_passing_on()
         self._signs.close()
         if self._coming_back is not None:
             self._coming_back.cancel()
@@ -266,6 +271,11 @@ class ShareServer:
                 pass  # kept already
             case _ if not self._commanding.hears(self._inside.facts.me, message):
                 self._tell_all(message)
+
+    def _pass_on(self, event: LineEvent) -> None:
+        """Send a write to all programs before any later reply, which may show its effect."""
+        if isinstance(event, DeviceWritten):
+            self._tell_all(event)
 
     def _stopped(self, stop: StopGiven) -> None:
         """Another program stops devices; a repeated message counts once."""

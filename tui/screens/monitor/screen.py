@@ -309,6 +309,7 @@ class ViewSource:
             stands_by=snapshot is not None and stands_by(console.session, snapshot.state),
             fault_at=self._fault_at(),
             word=word,
+            me=session.line.facts.me.text,
         )
 
     def _fault_at(self) -> str:

@@ -13,8 +13,10 @@ from typing import NamedTuple
 from rich.style import Style
 from rich.text import Text
 
+from tui.drive.sentences import all_of
 from tui.session.monitor.trend import TREND_MARKS, TrendMark, TrendPoint
 from tui.widgets.curve import CurveScale, Plot
+from tui.widgets.drawing import short
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
@@ -23,6 +25,7 @@ from tui.widgets.palette import (
     FAULT,
     KEY,
     LINE,
+    PLAIN,
     RUNNING,
     STRONG,
 )
@@ -43,6 +46,9 @@ MARK_SIGNS: dict[TrendMark, tuple[str, Style, str]] = {
     "reference": ("◆", REFERENCE_STYLE, "reference"),
 }
 """Sign, style and name of each mark."""
+THIS_PANEL = "this panel"
+MOST_NAMED_CODES = 3
+"""Most settings of one write that are named."""
 
 
 class ShownPage(NamedTuple):
@@ -156,15 +162,49 @@ def axis_lines(page: ShownPage, rows: int, names: Mapping[TrendMark, MarkName]) 
             cells[column] = (character, FAINT)
     for column, mark in page.marks.items():
         cells[column] = MARK_SIGNS[mark][:2]
-    at = plot.column(view.cursor) if view.cursor is not None else None
-    if at is not None:
+    if (at := _cursor_column(page)) is not None:
         cells[at] = (cells[at][0] if cells[at][0] != " " else "┴", KEY + CURSOR)
     axis = Text(" " * LABEL_CELLS, no_wrap=True).append("└", LINE)
     for style, run in groupby(cells, key=itemgetter(1)):
         axis.append("".join(character for character, _ in run), style)
     if rows == 1:
-        return [axis]
-    return [axis, Text(" " * (LABEL_CELLS + 1), no_wrap=True).append(times, FAINT)]
+        return [_with_cause(page, axis)]
+    below = Text(" " * (LABEL_CELLS + 1), no_wrap=True).append(times, FAINT)
+    return [axis, _with_cause(page, below)]
+
+
+def _with_cause(page: ShownPage, line: Text) -> Text:
+    """Return the line with the cause of the mark under the cursor, if it is known."""
+    at = _cursor_column(page)
+    text = _cause(page, at) if at is not None and at in page.marks else ""
+    if not text or at is None:
+        return line
+    width = LABEL_CELLS + 1 + page.columns + MARGIN_CELLS
+    text = f" {short(text, width - 2)} "
+    start = max(0, min(LABEL_CELLS + at, width - len(text)))
+    line.append(" " * (width - line.cell_len))
+    return Text.assemble(line[:start], (text, PLAIN), line[start + len(text) :], no_wrap=True)
+
+
+def _cursor_column(page: ShownPage) -> int | None:
+    view = page.view
+    return None if view.cursor is None else page.plot(1, CurveScale(0, 1)).column(view.cursor)
+
+
+def _cause(page: ShownPage, column: int) -> str:
+    """Return the name of the mark in a column, and the programs that may have caused it."""
+    mark, plot = page.marks[column], page.plot(1, CurveScale(0, 1))
+    found = (p for p in page.points if p.mark == mark and plot.column(p.time) == column)
+    point = next(found)
+    programs = [THIS_PANEL if by == page.view.me else by for by in point.by]
+    if not programs:
+        return ""
+    by, name = all_of(programs), MARK_SIGNS[mark][2]
+    if mark != "write":
+        return f"{name} after a command of {by}"
+    codes = point.codes
+    settings = f"{len(codes)} settings" if len(codes) > MOST_NAMED_CODES else ", ".join(codes)
+    return f"{name} of {settings} by {by}"
 
 
 FULL_CELLS = 10

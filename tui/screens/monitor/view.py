@@ -72,6 +72,8 @@ class View:
     """Time of the trip, or of the fault's first read, as text; empty if unknown."""
     word: int | None = None
     """Index of the table shown instead of the curve; None for the curve."""
+    me: str = ""
+    """Name of this program among those on the line."""
 
     def reading(self, code: str) -> Shown | None:
         """Return a reading with its quality at this moment; None if there is none."""

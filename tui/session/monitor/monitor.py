@@ -101,7 +101,7 @@ class Monitor:
     def add_to_trend(self, cycle: TrendCycle) -> None:
         """Add a cycle, or a check between the cycles, to the trend. In the line's thread."""
         self._notes.ask()
-        self._notes.add(self._trend.add(cycle, self.session.edits_written))
+        self._notes.add(self._trend.add(cycle))
 
     @property
     def running(self) -> bool:

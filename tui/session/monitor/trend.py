@@ -5,14 +5,18 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
-from typing import Literal, Protocol, get_args
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, Protocol, get_args
 
 import msgspec
 
 from tui.bus.line_events import LineEvent, NoteReceived
 from tui.bus.notes import LONGEST_KIND, LineNote
+from tui.bus.program import readable
+from tui.bus.requests import BROADCAST
 from tui.bus.shared_state import SharedState
+from tui.bus.written import DeviceWritten
+from tui.drive.foreign_write import WordKind, classify_words
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 
@@ -43,6 +47,10 @@ class TrendPoint:
     values: tuple[float | None, ...]
     mark: str = ""
     """A TrendMark, or empty; a program of another version may leave others."""
+    by: tuple[str, ...] = ()
+    """Programs that wrote the settings, or a command or reference in the COMMAND_REACH before."""
+    codes: tuple[str, ...] = ()
+    """Settings that a `write` changed; `register N` for an address that the profile lacks."""
 
 
 class TrendCycle(Protocol):
@@ -67,7 +75,7 @@ class TrendCycle(Protocol):
 
 TrendMark = Literal["lost", "trip", "stop", "start", "reset", "write", "reference"]
 """Event in a trend: the drive stopped answering, tripped, stopped, started, was reset, got
-settings by an edit, or got another reference."""
+settings from a program on the line, or got another reference."""
 TREND_MARKS: tuple[TrendMark, ...] = get_args(TrendMark)
 """All of them, the most urgent first."""
 REFERENCE_STEP = 0.5
@@ -119,11 +127,23 @@ class Trend:
         times = sorted(point for point in points if point >= last - TREND_SECONDS)
         self._points = deque(points[time] for time in times)
 
-    def add(self, cycle: TrendCycle, edits: int = 0) -> TrendPoint:
-        """Add a cycle; a failed cycle leaves a gap, never a repeated value.
+    def note_write(self, written: DeviceWritten) -> None:
+        """Note a write to the drive by any program, for the mark of the next cycle."""
+        words = classify_words(self._profile, written.words, {})
+        settings = [item for item in words if item.kind in (WordKind.SETTING, WordKind.UNKNOWN)]
+        codes = [
+            code
+            for item in settings
+            for code in [part.code for part in item.parameters] or [f"register {item.address}"]
+        ]
+        by = written.program.text
+        if codes:
+            self._marker.writes.append(TrendWrite(written.time, by, tuple(dict.fromkeys(codes))))
+        if len(settings) < len(words):
+            self._marker.commands.append(TrendWrite(written.time, by))
 
-        `edits` is the number of settings that this program has written to the drive so far.
-        """
+    def add(self, cycle: TrendCycle) -> TrendPoint:
+        """Add a cycle; a failed cycle leaves a gap, never a repeated value."""
         state = None if cycle.error else cycle.state
         readings = with_text(cycle.readings)
         values = tuple(
@@ -132,8 +152,8 @@ class Trend:
             else None
             for code in self._codes
         )
-        mark = self._marker.mark(cycle, values[REFERENCE_PLACE], edits)
-        point = TrendPoint(cycle.time, values, mark)
+        mark, by, codes = self._marker.mark(cycle, values[REFERENCE_PLACE])
+        point = TrendPoint(cycle.time, values, mark, by, codes)
         self._points.append(point)
         while self._points[0].time < cycle.time - TREND_SECONDS:
             self._points.popleft()
@@ -144,6 +164,31 @@ REFERENCE_PLACE = TREND_QUANTITIES.index("frequency_reference")
 """Place of the reference among the values of a point."""
 
 
+COMMAND_REACH = 2.0
+"""Seconds before the end of a cycle in which a command may be the cause of its event."""
+MOST_COMMANDS = 20
+"""Commands that are kept for the cause of an event."""
+MOST_BY, MOST_CODES = 2, 20
+"""Programs and settings that a point names; the newest programs, the first settings."""
+COMMANDED = ("stop", "start", "reset", "reference")
+
+
+class TrendWrite(NamedTuple):
+    """Write to a drive, with its time (monotonic) and program; no codes for a command."""
+
+    time: float
+    by: str
+    codes: tuple[str, ...] = ()
+
+
+class MarkedEvent(NamedTuple):
+    """Event of a cycle, with the fields of its point."""
+
+    mark: str
+    by: tuple[str, ...] = ()
+    codes: tuple[str, ...] = ()
+
+
 class TrendMarker:
     """Finds the events between one cycle and the next."""
 
@@ -152,27 +197,36 @@ class TrendMarker:
         """Kind of the last known state; empty before the first, and after an unknown one."""
         self._failed = True
         self._references: tuple[float | None, float | None] = (None, None)
-        self._edits = 0
+        self.writes: list[TrendWrite] = []
+        """Writes of settings since the last cycle that succeeded."""
+        self.commands: deque[TrendWrite] = deque(maxlen=MOST_COMMANDS)
+        """The last writes of commands and references, the newest last."""
 
-    def mark(self, cycle: TrendCycle, reference: float | None, edits: int) -> str:
-        """Return the most urgent event since the last cycle; empty without one."""
+    def mark(self, cycle: TrendCycle, reference: float | None) -> MarkedEvent:
+        """Return the most urgent event since the last cycle."""
         state = None if cycle.error else cycle.state
-        found = set(self._events(state, reference, edits))
+        found = set(self._events(state, reference))
         self._failed = state is None
         self._references = (self._references[1], reference)
+        writes = self.writes
         if state is not None:
-            self._kind, self._edits = "" if state.kind == "unknown" else state.kind, edits
-        return next((mark for mark in TREND_MARKS if mark in found), "")
+            self._kind, self.writes = "" if state.kind == "unknown" else state.kind, []
+        mark = next((mark for mark in TREND_MARKS if mark in found), "")
+        if mark == "write":
+            codes = tuple(dict.fromkeys(code for write in writes for code in write.codes))
+            return MarkedEvent(mark, _programs(writes), codes[:MOST_CODES])
+        if mark not in COMMANDED:
+            return MarkedEvent(mark)
+        recent = [item for item in self.commands if cycle.time - item.time <= COMMAND_REACH]
+        return MarkedEvent(mark, _programs(recent))
 
-    def _events(
-        self, state: DriveState | None, reference: float | None, edits: int
-    ) -> Iterator[TrendMark]:
+    def _events(self, state: DriveState | None, reference: float | None) -> Iterator[TrendMark]:
         """Yield the events of a cycle; `state` is None if it failed."""
         if state is None:
             if not self._failed:
                 yield "lost"
             return
-        if edits > self._edits:
+        if self.writes:
             yield "write"
         before, kind = self._kind, state.kind
         if before and kind not in (before, "unknown"):
@@ -184,6 +238,12 @@ class TrendMarker:
             return  # an analog input changes with each cycle: only a step from rest is an event
         if abs(reference - last) >= REFERENCE_STEP:
             yield "reference"
+
+
+def _programs(writes: Iterable[TrendWrite]) -> tuple[str, ...]:
+    """Return the programs of writes, the last ones last."""
+    newest = dict.fromkeys(write.by for write in reversed(list(writes)))
+    return tuple(newest)[:MOST_BY][::-1]
 
 
 def _change(before: str, kind: str) -> Iterator[TrendMark]:
@@ -210,6 +270,8 @@ NOTED_EVERY = 2.0
 """Seconds of the trend in one note, approximately: a killed program loses as many."""
 MOST_NOTED = 100
 """Points in one note."""
+LONGEST_BY = 120
+"""Characters of the name of a program or a setting, of those that another program leaves."""
 
 
 class TrendNotes:
@@ -256,12 +318,24 @@ class TrendNotes:
             self._notes.leave(LineNote(self._device, self._kind, data))
 
     def _hear(self, event: LineEvent) -> None:
-        if not isinstance(event, NoteReceived):
-            return
-        note = event.note
-        if (note.device, note.kind) == (self._device, self._kind):
-            points = msgspec.msgpack.decode(note.data, type=list[TrendPoint])
-            self._others += [point for point in points if _is_whole(point)]
+        match event:
+            case NoteReceived(note) if (note.device, note.kind) == (self._device, self._kind):
+                points = msgspec.msgpack.decode(note.data, type=list[TrendPoint])
+                self._others += [_plain(point) for point in points if _is_whole(point)]
+            case DeviceWritten(device=device) if device in (BROADCAST, self._device):
+                self._trend.note_write(event)
+
+
+def _plain(point: TrendPoint) -> TrendPoint:
+    """Return a point of another program with texts that can be shown."""
+    if not point.mark:
+        return point
+    by, codes = point.by[:MOST_BY], point.codes[:MOST_CODES]
+    return replace(
+        point,
+        by=tuple(readable(text, LONGEST_BY) for text in by),
+        codes=tuple(readable(text, LONGEST_BY) for text in codes),
+    )
 
 
 def _is_whole(point: TrendPoint) -> bool:

@@ -217,7 +217,6 @@ class Editor:
 
     def _applied(self, applied: Applied) -> None:
         self._mark(self.marks.edited([result.edit.code for result in applied.written]))
-        self.session.edits_written += _count_sent(applied.written)
         self.waits_for_reset |= set(applied.after_reset)
         self.moved = next((link for link in applied.links if link.at_once), None)
 
@@ -225,7 +224,6 @@ class Editor:
         """After a stop, unstage what the drive holds, and keep the rest."""
         done = self.staging.drop_written()
         self._mark(self.marks.edited([result.edit.code for result in done]))
-        self.session.edits_written += _count_sent(done)
         with suppress(LineError):
             self.session.line.spawn(self._see_what_is_held, f"edits {self.session.device}")
         left = len(self.staging.edits)
@@ -288,10 +286,6 @@ class Editor:
 
     def _say(self, text: str, kind: OutcomeKind) -> None:
         self.session.work.report(kind, text)
-
-
-def _count_sent(done: Iterable[Result]) -> int:
-    return sum(not result.unchanged for result in done)
 
 
 def _summary(applied: Applied, staged: Sequence[str]) -> str:
