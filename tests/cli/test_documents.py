@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import socket
 import subprocess
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.programs import DRIVEPANEL, drivepanel, free_port, port_of, served
+from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, free_port, port_of, served
 from tui.cli.command_index import COMMANDS
 from tui.cli.derived import commands_of, documents_schema
 from tui.cli.running.scan_telling import ScanTelling
@@ -101,6 +102,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
 """By name: exit status, words, and the forms of the documents. FOLDER is that of the fixture."""
 ELSEWHERE = {
     "RunDocument", "HoldDocument", "ProveDocument", "SimulationReady", "InputsDocument",
+    "BenchDocument", "BenchWaitsDocument", "BenchRefusedDocument",
     "ServeReady", "PublishReady", "ScanSlowDocument", "ScanUnclearDocument", "PortDocument",
 }  # fmt: skip
 """Forms of the tests below; this computer may have no port."""
@@ -168,8 +170,19 @@ async def test_status_of_a_fault_prints_its_document() -> None:
     assert row["fault"]["reset"]
 
 
-def test_simulate_prints_its_documents() -> None:
+BENCH_LINES = {
+    "2: trip OCF": "BenchDocument",
+    "2: LI1=0": "InputsDocument",
+    "in 3600s: 2: clear": "BenchWaitsDocument",
+    "2: trip": "BenchRefusedDocument",
+}
+"""Lines to the socket of `simulate`, and the forms of the answers."""
+
+
+def test_simulate_prints_its_documents(tmp_path: Path) -> None:
+    place = str(tmp_path / "bench")
     simulate = [*DRIVEPANEL, "simulate", "atv71@2", "--tcp", "127.0.0.1:0", "--json"]
+    simulate += ["--socket", place]
     with served(simulate, ready="{", stdin=subprocess.PIPE) as simulation:
         (reported,) = documents(simulation.ready)
         process = simulation.process
@@ -178,6 +191,12 @@ def test_simulate_prints_its_documents() -> None:
         process.stdin.write("2: LI1=1\n")
         process.stdin.flush()
         assert forms_of(process.stdout.readline()) == {"InputsDocument"}
+        with socket.socket(socket.AF_UNIX) as bench, bench.makefile("r") as answers:
+            bench.settimeout(PATIENCE)
+            bench.connect(place)
+            for line, form in BENCH_LINES.items():
+                bench.sendall(f"{line}\n".encode())
+                assert forms_of(answers.readline()) == {form}
     assert form_of(reported) == "SimulationReady"
     assert port_of(reported["line"])
     assert reported["drives"] == [{"profile": "atv71", "device": 2}]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.simulator import DriveSpec, Simulation, SimulatorError, set_inputs
+from tui.simulator import Bench, DriveSpec, Simulation, SimulatorError
 
 from .small import PROFILES
 
@@ -12,6 +12,13 @@ from .small import PROFILES
 def simulation(*profiles: str) -> Simulation:
     drives = [DriveSpec(profile, address) for address, profile in enumerate(profiles, 2)]
     return Simulation(drives, profiles=PROFILES)
+
+
+def set_inputs(made: Simulation, line: str) -> str:
+    """Carry out a line that concerns one drive; return its result."""
+    (result,) = Bench(made).do(line)
+    assert result.inputs
+    return f"{result.device}: {result.text}"
 
 
 def test_line_sets_inputs_of_the_named_drive() -> None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tui.simulator.plant.motor import MotorDemand, MotorState, approach, rating_of, step
+from tui.simulator.plant.motor import MotorDemand, MotorState, Shaft, approach, rating_of, step
 
 RATING = rating_of("ATV71HU15M3")
 GO = MotorDemand(energised=True, target=50.0, acceleration=10.0, deceleration=5.0)
@@ -14,7 +14,7 @@ GO = MotorDemand(energised=True, target=50.0, acceleration=10.0, deceleration=5.
 
 def run(state: MotorState, order: MotorDemand, seconds: float, load: float = 0.7) -> MotorState:
     for _ in range(round(seconds / 0.05)):
-        state = step(state, RATING, order, load, 230.0, 0.05)
+        state = step(state, RATING, order, Shaft(load), 230.0, 0.05)
     return state
 
 
@@ -121,6 +121,6 @@ def test_energy_and_hours_add_up() -> None:
 
 
 def test_long_step_equals_many_short_ones() -> None:
-    once = step(MotorState(), RATING, GO, 0.7, 230.0, 2.5)
+    once = step(MotorState(), RATING, GO, Shaft(0.7), 230.0, 2.5)
     assert once.frequency == pytest.approx(25)
     assert once.motor_thermal == pytest.approx(run(MotorState(), GO, 2.5).motor_thermal)

@@ -9,6 +9,7 @@ from enum import Enum
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 
+from .plant.conditions import Conditions
 from .plant.motor import MotorState, RatingPlate, Stop
 from .plant.terminals import PLAIN_TERMINALS, Terminals
 from .registers import Registers
@@ -24,6 +25,8 @@ class ActiveFault:
     persists: bool = False
 
 
+SPEED_LIMITS: frozenset[Quantity] = frozenset({"high_speed", "low_speed"})
+"""Limits of the reference that a drive with the planted defect `no-limits` ignores."""
 CHART_WORDS: Mapping[Quantity, str] = {"status_word": "status", "command_word": "command"}
 
 
@@ -77,10 +80,10 @@ class Body:
     registers: Registers
     rating: RatingPlate
     motor: MotorState = field(default_factory=MotorState)
-    powered: bool = True
-    """True if the drive's supply is on; without it the drive is silent."""
     terminals: Terminals = field(default_factory=lambda: Terminals(PLAIN_TERMINALS))
     """Its inputs; no trip, reset or power-down changes them."""
+    conditions: Conditions = field(default_factory=Conditions)
+    """Its supply, load and wire, and the defects planted in it."""
     earlier_hz: float | None = None
     """Reference in Hz of another master before the line's first one; None if there is none."""
     fault: ActiveFault | None = None
@@ -92,6 +95,11 @@ class Body:
     saving: float = 0.0
     """Remaining time in s of an EEPROM save; nothing can be written until it ends."""
     line_orders: LineOrders = field(default_factory=LineOrders)
+
+    @property
+    def powered(self) -> bool:
+        """True if the drive's supply is on; without it the drive is silent."""
+        return self.conditions.powered
 
     # Parameters by meaning
 
@@ -115,7 +123,9 @@ class Body:
         """Return the engineering value in force of a quantity; the default if the family has
         none."""
         found = self.parameter(quantity)
-        return default if found is None else self.engineering(found)
+        if found is None or (quantity in SPEED_LIMITS and self.unlimited):
+            return default
+        return self.engineering(found)
 
     def engineering(self, parameter: Parameter) -> float:
         """Engineering value in force of a parameter."""
@@ -158,6 +168,17 @@ class Body:
         if found := self.registers.named(code):
             self.registers.put(found, raw)
 
+    # Planted defects
+
+    @property
+    def unlimited(self) -> bool:
+        """True if the drive ignores its limits, by a planted defect."""
+        return "no-limits" in self.conditions.planted
+
+    def directed(self, hz: float) -> float:
+        """Return a signed reference in Hz; a planted defect swaps its direction."""
+        return -hz if "swapped-direction" in self.conditions.planted else hz
+
     # Ramps
 
     def ramps(self, second: bool = False) -> tuple[float, float]:
@@ -165,7 +186,8 @@ class Body:
         span = self.value("rated_frequency", self.rating.frequency)
         up = self.value("acceleration_2" if second else "acceleration", 3.0)
         down = self.value("deceleration_2" if second else "deceleration", up)
-        return span / max(up, 0.01), span / max(down, 0.01)
+        slower = self.conditions.slows()
+        return span / max(up * slower, 0.01), span / max(down * slower, 0.01)
 
     def rates(self, stop: Stop, second: bool = False) -> tuple[float, float]:
         """Return the ramps during a `stop`: a fast stop divides the deceleration time by DCF."""

@@ -19,7 +19,7 @@ from .plant.fault_history import fault_raw
 from .plant.first_values import first_values, model_words
 from .plant.memory import SettingsMemory
 from .plant.monitoring import show_motor
-from .plant.motor import Load, MotorDemand, MotorState, Stop, Wanderer, rating_of, step
+from .plant.motor import Load, MotorDemand, MotorState, Shaft, Stop, Wanderer, rating_of, step
 from .plant.terminals import BY_KIND, COMPACT, Terminals
 from .plant.watch import SilenceWatch
 from .registers import Registers, typed_raw
@@ -69,6 +69,8 @@ class SimulatedDrive:
             motor=MotorState(run_hours=hours, on_hours=1.6 * hours, energy=hours * rating.power),
         )
         self.terminals = self._body.terminals
+        self.conditions = self._body.conditions
+        """Its supply, load, wire and planted defects; a change acts at the next step."""
         self._chart = CHARTS[traits.kind](self._body)
         self._watch = SilenceWatch(self._body)
         self._tripping = Tripping(self._body, self._chart, self._watch)
@@ -80,7 +82,12 @@ class SimulatedDrive:
         }
         functions = {f.code: f for f in profile.data.functions}
         words = DriveWords(
-            profile, traits, self.registers, blocked=self._blocked, written=self._written
+            profile,
+            traits,
+            self.registers,
+            blocked=self._blocked,
+            written=self._written,
+            unlimited=lambda: self._body.unlimited,
         )
         self.server = Server(words, functions, traits.refusals, identification, identity)
         self.line_side = Answering(
@@ -126,7 +133,7 @@ class SimulatedDrive:
         """Switch the supply on: saved settings take effect, commands are discarded."""
         with self._lock:
             body = self._body
-            body.powered = True
+            body.conditions.powered = True
             self.registers.restore()
             body.line_orders.forget()
             body.saving = 0.0
@@ -148,7 +155,7 @@ class SimulatedDrive:
     def power_off(self) -> None:
         """Switch the supply off: the drive is silent and the motor coasts."""
         with self._lock:
-            self._body.powered = False
+            self.conditions.powered = False
 
     def power_cycle(self) -> None:
         """Switch the drive's supply off and on."""
@@ -232,7 +239,7 @@ class SimulatedDrive:
         with self._lock:
             body = self._body
             if not body.powered:
-                body.motor = step(body.motor, body.rating, MotorDemand(), 0.0, 0.0, dt)
+                body.motor = step(body.motor, body.rating, MotorDemand(), self._shaft(), 0.0, dt)
                 return
             body.saving = max(0.0, body.saving - dt)
             if (hz := self._wanderer.step(dt)) is not None:
@@ -241,14 +248,19 @@ class SimulatedDrive:
             self._load.step(dt)
             self._tripping.step(dt)
             order = self._chart.order()
-            load = self._load.torque
-            body.motor = step(body.motor, body.rating, order, load, self._mains(), dt)
+            body.motor = step(body.motor, body.rating, order, self._shaft(), self._mains(), dt)
             if isinstance(self._chart, Altivar21Chart) and self._chart.energy_reset:
                 body.motor = replace(body.motor, energy=0.0)
             self._show()
 
     def _mains(self) -> float:
-        return self._body.rating.voltage * self._load.mains
+        volts = self.conditions.volts
+        return self._body.rating.voltage * self._load.mains if volts is None else volts
+
+    def _shaft(self) -> Shaft:
+        given = self.conditions
+        load = self._load.torque if given.load is None else given.load
+        return Shaft(load, given.inertia, given.jammed)
 
     def _refresh(self) -> None:
         """Update the motor and the shown words without advancing the time."""
@@ -257,7 +269,7 @@ class SimulatedDrive:
             self._tripping.look()
         order = self._chart.order()
         mains = self._mains() if body.powered else 0.0
-        body.motor = step(body.motor, body.rating, order, self._load.torque, mains, 0.0)
+        body.motor = step(body.motor, body.rating, order, self._shaft(), mains, 0.0)
         self._show()
 
     def _show(self) -> None:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import threading
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -17,9 +16,9 @@ from ..shared.completion import complete_profile
 from ..shared.host_port import host_port, written_host_port
 from ..shared.numbers import FiniteRange
 from ..shared.options import json_option
-from ..shared.output import json_text, print_json
+from ..shared.output import print_json
 from ..shared.registration import command
-from ..shared.say import say, say_beside
+from ..shared.say import say
 from ..shared.signals import never_suspended
 
 if TYPE_CHECKING:
@@ -90,6 +89,17 @@ USUAL = (19200, "8E1")
     metavar="HZ",
     help="Run the motors at this frequency from the start.",
 )
+@click.option(
+    "--script",
+    metavar="FILE",
+    help="Run the lines of this file (docs/cli.md, the bench).",
+)
+@click.option(
+    "--socket",
+    "control",
+    metavar="PATH",
+    help="Take such lines at this Unix socket, and answer JSON.",
+)
 @json_option
 def simulate(
     drives: tuple[str, ...],
@@ -106,21 +116,39 @@ def simulate(
     faults: tuple[str, ...],
     seed: int,
     run_hz: float,
+    script: str | None,
+    control: str | None,
     as_json: bool,
 ) -> None:
     """Serve simulated drives until Ctrl-C or SIGTERM.
 
-    Lines such as "2: LI1=1, AI1=5V" on standard input set the inputs of the drive at address 2;
-    "2:" shows them.
+    Lines on standard input change a drive: "2: LI1=1, AI1=5V", "2: trip OCF", "all: power off",
+    "in 3.5s: 2: jam". "2:" shows its inputs, "2: state" its real state.
     """
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
         raise click.UsageError("Say where: one of --pty, --serial, --tcp, --rtu-tcp.")
     simulation = simulation_of(
         drives, baud, form, any_settings, real_time, sets, protects, faults, seed, run_hz
     )
+    from tui.simulator import Bench
+
+    from ..running.bench_lines import (
+        BenchSocket,
+        follow_input,
+        run_script,
+        say_result,
+        script_lines,
+    )
+
+    bench = Bench(simulation, lambda result: say_result(result, as_json))
+    lines = script_lines(bench, script) if script is not None else []
     stop = threading.Event()
-    with never_suspended(), handled(lambda *_: stop.set()), simulation:
+    with never_suspended(), handled(lambda *_: stop.set()), simulation, ExitStack() as ending:
+        ending.callback(bench.close)
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
+        if control is not None:
+            ending.callback(BenchSocket(bench, control).close)
+        bench.start()
         specs = [drive.spec for drive in simulation.drives]
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
         if as_json:
@@ -132,8 +160,9 @@ def simulate(
             print_json(SimulationReady(line=where, drives=found), compact=True)
         else:
             say(f"Ready: {names} on {where}. Ctrl-C ends it.")
-        inputs = (simulation, as_json)
-        threading.Thread(target=_follow, args=inputs, name="inputs", daemon=True).start()
+        run_script(bench, lines, as_json)
+        inputs = (bench, as_json)
+        threading.Thread(target=follow_input, args=inputs, name="inputs", daemon=True).start()
         stop.wait()
 
 
@@ -170,25 +199,6 @@ def simulation_of(
         seed=seed,
         any_settings=any_settings,
     )
-
-
-def _follow(simulation: Simulation, as_json: bool) -> None:
-    """Set inputs as the lines of standard input say; a wrong line is reported."""
-    from tui.simulator import SimulatorError, set_inputs
-
-    from ..documents.other_documents import InputsDocument
-
-    for line in typed_lines():
-        if line.strip():
-            try:
-                text = set_inputs(simulation, line)
-            except SimulatorError as error:
-                say_beside(str(error), err=True)
-                continue
-            if as_json:
-                say_beside(json_text(InputsDocument(text=text)), as_it_is=True)
-            else:
-                say_beside(text)
 
 
 def _serve(
@@ -283,33 +293,3 @@ def _typed_troubles(faults: tuple[str, ...]) -> dict[str, float]:
         except click.BadParameter:
             raise click.UsageError(f"{text!r}: write KIND=VALUE, for example late=0.15.") from None
     return values
-
-
-BYTES_AT_ONCE = 4096
-BACKGROUND_PAUSE = 1.0
-"""Seconds between two tries while the terminal belongs to another program."""
-
-
-def typed_lines(handle: int = 0) -> Iterator[str]:
-    """Lines without their ends, until the input ends; for a thread of its own.
-
-    Reads the handle itself: a buffered stream that waits would hold up the end of the program. In
-    the background of a shell it waits until the program is in the foreground.
-    """
-    rest = b""
-    while (data := _read(handle)) != b"":
-        *lines, rest = (rest + data).split(b"\n")
-        for line in lines:
-            yield line.decode("utf-8", "replace").rstrip("\r")
-    if rest:
-        yield rest.decode("utf-8", "replace")
-
-
-def _read(handle: int) -> bytes:
-    while True:
-        try:
-            return os.read(handle, BYTES_AT_ONCE)
-        except OSError:
-            if not os.isatty(handle):
-                return b""
-            time.sleep(BACKGROUND_PAUSE)

@@ -251,12 +251,58 @@ class PublishReady(Document, kw_only=True):
     mqtt: str
 
 
+class BenchStateField(DocumentPart):
+    """Real state of a simulated drive; `shaft_hz` is signed by the direction, `current` in A."""
+
+    powered: bool
+    fault: str | None
+    output_hz: float
+    shaft_hz: float
+    current: float
+    mains: float
+    wire_cut: bool
+    jammed: bool
+    planted: list[str]
+
+
 class InputsDocument(Document, kw_only=True):
-    """`simulate`: inputs of a drive were set or asked for."""
+    """`simulate`: inputs of a drive were set or asked for; `time` is in s since the start."""
 
     command: Literal["simulate"] = "simulate"
     event: Literal["inputs"] = "inputs"
     text: str
+    time: float
+    device: int
+    drive: BenchStateField
+
+
+class BenchDocument(Document, kw_only=True):
+    """`simulate`: a line of the bench was carried out; `time` is in s since the start."""
+
+    command: Literal["simulate"] = "simulate"
+    event: Literal["bench"] = "bench"
+    text: str
+    time: float
+    device: int
+    drive: BenchStateField
+
+
+class BenchWaitsDocument(Document, kw_only=True):
+    """`simulate`: a line waits for its time; `waiting` lines do so."""
+
+    command: Literal["simulate"] = "simulate"
+    event: Literal["waits"] = "waits"
+    text: str
+    waiting: int
+
+
+class BenchRefusedDocument(Document, kw_only=True):
+    """`simulate`: a line from a socket was refused; nothing was changed."""
+
+    command: Literal["simulate"] = "simulate"
+    event: Literal["refused"] = "refused"
+    text: str
+    error: str
 
 
 class JournalEntryField(DocumentPart):

@@ -220,22 +220,24 @@ class InputKeys(RunKeys):
         if simulation is None:
             self.app.notify(NOT_SIMULATED, severity="warning")
             return
-        from tui.simulator import SimulatorError, check_inputs, set_inputs
+        from tui.simulator import Bench, SimulatorError
 
         from ..dialogs.ask import Ask
 
         device = self.session.device
+        bench = Bench(simulation)
 
         def fault(text: str) -> str:
             try:
-                check_inputs(simulation, f"{device}: {text}")
+                bench.check(f"{device}: {text}")
             except SimulatorError as error:
                 return str(error)
             return ""
 
         def reported(text: str | None) -> None:
             if text is not None:
-                self.app.notify(f"Simulated inputs, {set_inputs(simulation, f'{device}: {text}')}")
+                for result in bench.do(f"{device}: {text}"):
+                    self.app.notify(f"Simulated inputs, {result.device}: {result.text}")
 
         question = f"Inputs of the simulated drive {device}"
         about = f"{simulation.drive(device).terminals.reported()}\n{LOOKS_LIKE}"

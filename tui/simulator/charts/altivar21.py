@@ -236,7 +236,7 @@ class Altivar21Chart:
         elif sources.reference:
             hz = self._line_reference()
         reverse = bool(self._word & REVERSE) if sources.command else self._inputs.reverse
-        return -hz if reverse else hz
+        return body.directed(-hz if reverse else hz)
 
     def _line_reference(self) -> float:
         body = self._body

@@ -311,7 +311,7 @@ class DrivecomChart:
             reverse = self._command.reverse != self._reference.turned_over(self._command.is_io)
         else:
             reverse = self._wiring.order.reverse
-        return -hz if reverse else hz
+        return self._body.directed(-hz if reverse else hz)
 
     # Words for the line
 

@@ -142,13 +142,14 @@ class LeroySomerChart:
     def _wanted(self, bits: int) -> float:
         hz = LEROY_FULL_HZ * self._body.terminals.level("AI1")
         if bits & PRESET_CHOSEN and self._body.registers.named(PRESET) is not None:
-            most = _signed(self._body.setting(MOST, 0)) or 0x7FFF
+            most = 0x7FFF if self._body.unlimited else _signed(self._body.setting(MOST, 0))
+            most = most or 0x7FFF
             hz = min(abs(_signed(self._body.setting(PRESET, 0))), most) / RPM_PER_HZ
         hz = min(hz, self._body.value("max_frequency", 1e9) or 1e9)
         if bits & JOG and not bits & (FORWARD | BACKWARD | RUN):
-            return JOG_HZ
+            return self._body.directed(JOG_HZ)
         backward = bool(bits & BACKWARD) or (bool(bits & RUN) and bool(bits & CHANGE_WAY))
-        return -hz if backward else hz
+        return self._body.directed(-hz if backward else hz)
 
     def show(self) -> None:
         """Put the status word and its bit parameters into their registers."""

@@ -307,7 +307,8 @@ class OwnChart:
         hz = self._reference.hz(by_line=self._runs)
         closed = self._body.terminals.closed
         backward = closed("REV") and not closed("RUN")
-        return -hz if (self._reverse if self._runs else backward) else hz
+        reverse = self._reverse if self._runs else backward
+        return self._body.directed(-hz if reverse else hz)
 
     # Words for the line
 

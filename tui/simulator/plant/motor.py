@@ -21,6 +21,8 @@ MAX_STEP = 0.05
 _MAGNETISING = 0.45
 _INERTIA = 0.02
 """Torque per Hz/s of acceleration, both in rated units."""
+_MOST_TORQUE = 1.6
+"""Limit of the torque by the current limitation, in rated units."""
 _COAST_TIME = 4.0
 _BRAKE_TIME = 0.8
 _MOTOR_THERMAL_TIME = 240.0
@@ -85,6 +87,17 @@ class MotorState:
 
 
 @dataclass(frozen=True, slots=True)
+class Shaft:
+    """Load on the motor's shaft: its torque, 1.0 at the rated one, and its inertia."""
+
+    load: float = 0.0
+    inertia: float = 1.0
+    """Factor of the usual inertia."""
+    jammed: bool = False
+    """True if the shaft cannot turn."""
+
+
+@dataclass(frozen=True, slots=True)
 class MotorDemand:
     """Demand on the motor by commands and reference: target in Hz, ramps in Hz/s."""
 
@@ -96,10 +109,9 @@ class MotorDemand:
 
 
 def step(
-    state: MotorState, rating: RatingPlate, order: MotorDemand, load: float, mains: float, dt: float
+    state: MotorState, rating: RatingPlate, order: MotorDemand, load: Shaft, mains: float, dt: float
 ) -> MotorState:
-    """Return the state after `dt` seconds at a load (1.0 is rated torque) and a supply voltage in
-    V."""
+    """Return the state after `dt` seconds with a load and a supply voltage in V."""
     while dt > MAX_STEP:
         state = _step(state, rating, order, load, mains, MAX_STEP)
         dt -= MAX_STEP
@@ -107,26 +119,34 @@ def step(
 
 
 def _step(
-    state: MotorState, rating: RatingPlate, order: MotorDemand, load: float, mains: float, dt: float
+    state: MotorState, rating: RatingPlate, order: MotorDemand, load: Shaft, mains: float, dt: float
 ) -> MotorState:
     if order.injection:
-        moved = _brake(state, rating, dt)
+        moved = _brake(state, rating, dt / load.inertia)
     elif order.energised:
         moved = _drive(state, rating, order, load, dt)
     else:
-        moved = _coast(state, dt)
+        moved = _coast(state, dt / load.inertia)
+    if load.jammed:
+        moved = replace(moved, rotor=0.0)
     return _supply(moved, rating, mains, dt)
 
 
 def _drive(
-    state: MotorState, rating: RatingPlate, order: MotorDemand, load: float, dt: float
+    state: MotorState, rating: RatingPlate, order: MotorDemand, load: Shaft, dt: float
 ) -> MotorState:
     frequency = approach(state.frequency, order, dt)
+    if load.jammed:  # the current limitation keeps the frequency at the slip of the most torque
+        most = _MOST_TORQUE * rating.slip * rating.frequency
+        frequency = max(-most, min(most, frequency))
     acceleration = (frequency - state.frequency) / dt if dt > 0 else state.acceleration
     share = abs(frequency) / rating.frequency
     way = math.copysign(1.0, frequency) if frequency else 0.0
-    torque = way * load * (0.35 + 0.65 * min(share, 1.2) ** 2) + _INERTIA * acceleration
-    torque = max(-1.6, min(1.6, torque))
+    torque = way * load.load * (0.35 + 0.65 * min(share, 1.2) ** 2)
+    torque += _INERTIA * load.inertia * acceleration
+    if load.jammed:
+        torque = frequency / (rating.slip * rating.frequency) if rating.slip else way
+    torque = max(-_MOST_TORQUE, min(_MOST_TORQUE, torque))
     active = math.sqrt(1 - _MAGNETISING**2) * torque
     return replace(
         state,

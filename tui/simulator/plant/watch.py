@@ -87,6 +87,8 @@ class SilenceWatch:
         """True if the timeout has started and is not off."""
         if self._data is None or self.timeout is None:
             return False
+        if "no-timeout" in self._body.conditions.planted:
+            return False
         if self._body.traits.access_levels:
             cmi = self._body.raw("extended_command_word")
             if cmi & NO_MONITORING:

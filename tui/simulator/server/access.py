@@ -36,7 +36,9 @@ class DriveWords:
         *,
         blocked: Callable[[Parameter], bool],
         written: Callable[[Parameter], None],
+        unlimited: Callable[[], bool] = bool,
     ) -> None:
+        """`unlimited` returns True while the drive ignores the ranges of its words."""
         self._profile = profile
         self._refusals = traits.refusals
         self._limits = traits.limits
@@ -44,6 +46,7 @@ class DriveWords:
         self._registers = registers
         self._blocked = blocked
         self._written = written
+        self._unlimited = unlimited
         self._reading = profile.data.reading
         self._taught = {reference.parameter for reference in profile.data.teachable_references}
         """Words that accept a reference although no document describes them as writable."""
@@ -167,6 +170,8 @@ class DriveWords:
             raise Refused(self._refusals.unknown_address)
         if not self._may_be_written(parameter) or word_count(parameter) == 2:
             return
+        if self._unlimited():
+            return
         raw = from_words(parameter, [word])
         low, high = raw_range(parameter)
         names = self._profile.names(parameter)
@@ -178,6 +183,8 @@ class DriveWords:
 
     def _within(self, parameter: Parameter, raw: int) -> int:
         """Return the raw value reduced to the parameters that limit it."""
+        if self._unlimited():
+            return raw
         for code, bound in ((parameter.min_from, max), (parameter.max_from, min)):
             limit = self._registers.named(code) if code else None
             if limit and (limit.unit, limit.scale) == (parameter.unit, parameter.scale):

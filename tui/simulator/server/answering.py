@@ -112,7 +112,12 @@ class Answering:
 
     def answers_at(self, address: int) -> bool:
         """Return True if one of the drive's servers has this address and replies at it."""
-        return self._body.powered and self._server_at(address) is not None
+        return self._connected and self._server_at(address) is not None
+
+    @property
+    def _connected(self) -> bool:
+        """True if the drive has its supply and its wire to the line."""
+        return self._body.powered and not self._body.conditions.wire_cut
 
     def _server_at(self, address: int) -> Server | None:
         if address == 0:
@@ -126,11 +131,11 @@ class Answering:
 
     def is_own(self, address: int) -> bool:
         """Return True if the drive's own server, not that of a card, has this address."""
-        return self._body.powered and self._server_at(address) is self._own
+        return self._connected and self._server_at(address) is self._own
 
     def is_called(self, address: int) -> bool:
         """Return True if a broadcast or group address means this drive too."""
-        return self._body.powered and self._station.is_called(address)
+        return self._connected and self._station.is_called(address)
 
     def answer(self, address: int, pdu: bytes) -> bytes | None:
         """Return the reply of the server at an address; None for no reply."""
