@@ -34,6 +34,7 @@ from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.help import HelpScreen
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.parameters.edit_value import PickValue
 from tui.screens.wiring.screen import WiringScreen
 from tui.session.command.stop_report import Phase, StopReport
 from tui.session.connect.open_line import OpenLine, open_line
@@ -577,3 +578,36 @@ async def test_internal_error_stops_the_motor() -> None:
 def broken() -> None:
     """An error that a screen should never raise."""
     raise RuntimeError("the screen is upside down")
+
+
+async def test_enter_on_a_step_of_control_proposes_its_value_and_writes_nothing() -> None:
+    async with bench("atv71", sets={"CHCF": 2, "FR1": 1, "CD1": 1}) as made:
+        await made.pilot.press("6")
+        await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))
+        await until(made.pilot, lambda: "Enter opens" in shown(made.app, "detail"))
+        control = made.app.screen
+        steps = ["Set FR1 to Modbus", "Set CD1 to Modbus", "Set CCS to Command channel 2"]
+        rows = [str(option.prompt) for option in control.query_one(OptionList).options]
+        assert [row.removeprefix(" → ") for row in rows[: len(steps)]] == steps
+        assert "FR1" in shown(made.app, "detail")
+        await made.pilot.press("down", "up", "enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, PickValue))
+        choices = made.app.screen.query_one(OptionList)
+        assert "Modbus" in str(choices.get_option_at_index(choices.highlighted or 0).prompt)
+        console = made.app.chosen
+        assert console is not None
+        assert not len(console.editor.staging.edits)
+        await made.pilot.pause(0.4)
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: len(console.editor.staging.edits) == 1)
+        assert console.editor.staging.edits.items[0].new == 164
+        await made.pilot.press("6")
+        await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))
+        listed = made.app.screen.query_one(OptionList)
+        await until(
+            made.pilot,
+            lambda: (
+                listed.option_count > 0 and "staged" in str(listed.get_option_at_index(0).prompt)
+            ),
+        )
+        assert writes(made.app) == []

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .channel import undecided
+from .control_source import SourceChange
 from .profile.profile import UNVERIFIED, Profile
 from .profile.schema import PathPosition, PathSource, PathSwitch, SignalPath, path_places
 from .sentences import all_of
@@ -137,16 +138,25 @@ def is_certain(state: PathState) -> bool:
 
 
 @dataclass(frozen=True, slots=True)
+class LineStep:
+    """One step that makes this line a source, in the imperative."""
+
+    text: str
+    change: SourceChange | None = None
+    """Parameter to set; None if the step moves an input or presses a key."""
+
+
+@dataclass(frozen=True, slots=True)
 class LineWay:
     """Steps that make this line the source of a signal."""
 
-    steps: tuple[str, ...]
-    """Actions in the imperative, in their order."""
+    steps: tuple[LineStep, ...]
+    """In their order."""
 
     @property
     def text(self) -> str:
         """All steps as one clause."""
-        return all_of(self.steps)
+        return all_of([step.text for step in self.steps])
 
 
 def ways_to_line(profile: Profile, state: PathState, raws: Mapping[str, int]) -> list[LineWay]:
@@ -167,39 +177,54 @@ def _way(
 ) -> LineWay | None:
     """Return the steps that make this line the source at one end; None if it cannot be there."""
     enters, source = end
-    steps: list[str] = []
+    steps: list[LineStep] = []
     if not source.is_line:
         if not source.line:
             return None
         if source_raw(source, raws) not in source.line:
             if profile[source.parameter].access == "r":
                 return None
-            steps.append(_set(profile, source.parameter, source.line[0]))
+            steps.append(_selected(profile, source, raws))
     for index, switch in enumerate(state.path.switches):
         wanted, now = int(index == enters), state.positions[index]
         if index < enters or (now is not None and now.contact == wanted):
             continue
-        step = "" if now is None else _turned(profile, switch, now, wanted)
-        if not step:
+        step = None if now is None else _turned(profile, switch, now, wanted, raws)
+        if step is None:
             return None
         steps.append(step)
     return LineWay(tuple(steps)) if steps else None
 
 
-def _turned(profile: Profile, switch: PathSwitch, now: PathPosition, contact: int) -> str:
-    """Return the action that brings a switch to a contact; empty if none is known.
+def _turned(
+    profile: Profile,
+    switch: PathSwitch,
+    now: PathPosition,
+    contact: int,
+    raws: Mapping[str, int],
+) -> LineStep | None:
+    """Return the step that brings a switch to a contact; None if none is known.
 
     A switch that an input or a key moves is moved by it; any other by its parameter.
     """
     positions = [position for position in switch.positions if position.contact == contact]
     if now.how and (found := next((at.how for at in positions if at.how), "")):
-        return found
+        return LineStep(found)
     for when in (at.when[0] for at in positions if len(at.when) == 1):
         if when.mask is None and when.parameter == switch.parameter:
-            return _set(profile, switch.parameter, when.values[0])
-    return ""
+            raw = when.values[0]
+            return _set(profile, switch.parameter, raw, raw, raws)
+    return None
 
 
-def _set(profile: Profile, code: str, raw: int) -> str:
-    name = profile.names(profile[code]).get(raw, str(raw))
-    return f"set {code} to {name}"
+def _selected(profile: Profile, source: PathSource, raws: Mapping[str, int]) -> LineStep:
+    """Return the step that selects this line at a source; other bits of its word stay."""
+    value = source.line[0]
+    raw = raws.get(source.parameter, 0) & ~source.mask & 0xFFFF | value << source.shift
+    return _set(profile, source.parameter, value, raw, raws)
+
+
+def _set(profile: Profile, code: str, value: int, raw: int, raws: Mapping[str, int]) -> LineStep:
+    name = profile.names(profile[code]).get(value, str(value))
+    change = SourceChange(profile[code], raws.get(code), raw)
+    return LineStep(f"set {code} to {name}", change)

@@ -157,8 +157,11 @@ class Panel(LeanApp):
         """Show a screen, on the drive that is open."""
 
     @abstractmethod
-    async def open_parameter(self, code: str) -> None:
-        """Show a parameter of the open drive in the editor, under the cursor."""
+    async def open_parameter(self, code: str, proposed: int | None = None) -> None:
+        """Show a parameter of the open drive in the editor, under the cursor.
+
+        With a `proposed` raw value, its dialog opens with this value, which is not staged.
+        """
 
     @property
     @abstractmethod

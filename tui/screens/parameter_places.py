@@ -13,14 +13,22 @@ class ParameterPlaces(Places):
         """Go to the parameter search; what is typed next is searched for."""
         await self._ask_parameters("action_search")
 
-    async def open_parameter(self, code: str) -> None:
-        """Show a parameter of the open drive in the editor, under the cursor."""
+    async def open_parameter(self, code: str, proposed: int | None = None) -> None:
+        """Show a parameter of the open drive in the editor, under the cursor.
+
+        With a `proposed` raw value, its dialog opens with this value, which is not staged.
+        """
         from textual.widgets import Input
+
+        from .parameters.stage_keys import StageKeys
 
         if shown := self.action_goto(PARAMETERS):
             await shown
         self.screen.query_one("#search", Input).value = code
         self.screen.set_focus(None)
+        if proposed is not None and isinstance(self.screen, StageKeys):
+            # in the new screen: the one on which Enter was pressed gets no answer once it is closed
+            self.screen.call_later(self.screen.edit, code, proposed)
 
     async def action_eeprom(self) -> None:
         """Save the settings of the open drive to its EEPROM."""

@@ -11,6 +11,8 @@ from tui.drive.profile.schema import PathSource
 from tui.drive.sentences import any_of
 from tui.drive.shown import shown
 from tui.drive.signal_path import (
+    LineStep,
+    LineWay,
     PathState,
     Signal,
     path_codes,
@@ -23,6 +25,8 @@ from tui.drive.values import set_bits
 from tui.safety import LOOK_IS_OLD
 
 from .drive import DriveSession
+
+CARRIED: tuple[Signal, ...] = ("reference", "command")
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,6 +105,17 @@ class ControlPaths:
 
         Of several ways, those of the fewest steps; empty if it is the source, or none is known.
         """
-        ways = ways_to_line(self.session.profile, state, self.raws)
-        best = [way.text for way in ways if len(way.steps) == len(ways[0].steps)]
+        best = [way.text for way in self._best_ways(state)]
         return any_of(best) if best else ""
+
+    @property
+    def steps(self) -> tuple[LineStep, ...]:
+        """The steps of both signals that set a parameter, each once."""
+        states = [state for carries in CARRIED if (state := self.state(carries)) is not None]
+        steps = (step for s in states for way in self._best_ways(s) for step in way.steps)
+        found = {(c.parameter.code, c.new): step for step in steps if (c := step.change)}
+        return tuple(found.values())
+
+    def _best_ways(self, state: PathState) -> list[LineWay]:
+        ways = ways_to_line(self.session.profile, state, self.raws)
+        return [way for way in ways if len(way.steps) == len(ways[0].steps)]

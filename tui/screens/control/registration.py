@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 CHOOSE_WORD = "Choose the parameter that this word shows."
 PROVE = "Test the drive's reaction to a communication loss. Needs arming; asks first."
-WRITE_SOURCE = "Write the chosen configuration. Needs arming and standstill; asks first."
+WRITE_SOURCE = (
+    "Open the parameter of a step, or write the chosen configuration. Writing needs arming and"
+    " standstill, and asks first."
+)
 
 
 def create_control(console: DriveConsole) -> Screen[None]:
@@ -52,7 +55,7 @@ REGISTERED = (
         actions=(
             *ARMING,
             *key_rows(("prove", "P", "test", PROVE)),
-            Action("write_chosen", "enter", "write", WRITE_SOURCE, bound=False),
+            Action("write_chosen", "enter", "choose", WRITE_SOURCE, bound=False),
             *key_rows(("other_page", "tab", "map", "Show the communication map.")),
             *key_rows(("leave", "escape", "", "Go back to Monitor.")),
         ),

@@ -16,8 +16,9 @@ from tui.bus.errors import LineClosed, LineError
 from tui.bus.link import SerialLink
 from tui.drive.channel import switch_texts
 from tui.drive.chart import ENABLED_KINDS
-from tui.drive.control_source import source_changes, source_codes, source_in_force
+from tui.drive.control_source import SourceChange, source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
+from tui.drive.signal_path import LineStep
 from tui.session.console import DriveConsole
 from tui.session.control_paths import ControlPaths
 from tui.session.drive import DriveSession
@@ -41,6 +42,8 @@ from .view import (
     note_lines,
     now_lines,
     short_changes,
+    source_row,
+    step_row,
 )
 
 if TYPE_CHECKING:
@@ -54,6 +57,7 @@ WITH_RUNNING_MOTOR = (
     "THE MOTOR IS RUNNING. It reacts as set, and may coast; a hoist load falls. A stop is sent"
     " when the test ends, or when you press a stop key. "
 )
+PROPOSES = "Proposes the value on Parameters. Press w there to write it."
 FRAME_ROWS = 4
 """Rows of the status bar, the tabs, the message and the key bar."""
 LEAST_LISTED, LEAST_DETAIL = 2, 5
@@ -157,7 +161,10 @@ def fitted(lines: list[Text], room: int) -> list[Text]:
 
 
 class ControlSourceScreen(OrderKeys):
-    """The configurations of a family; Enter writes the chosen one, if armed and at standstill."""
+    """The steps to this line and the configurations of a family, in one list.
+
+    Enter opens the parameter of a step, or writes a configuration, if armed and at standstill.
+    """
 
     CSS_PATH = "control.tcss"
     BINDINGS: ClassVar = bindings(SOURCES)
@@ -172,8 +179,12 @@ class ControlSourceScreen(OrderKeys):
         self._paths = ControlPaths(self.session)
         self._trouble = "reading the configuration"
         self._seen: object = None
+        self._rows: tuple[LineStep | ControlSource, ...] = ()
+        """Contents of the list: steps that make this line a source, then configurations."""
         self._listed: object = self
-        """The configuration that the list marks; this screen before the first list."""
+        """Contents of the list at its last update; this screen before the first."""
+        self._placed: int | None = None
+        """Row on which this screen put the cursor; on another one, a person has moved it."""
 
     def body(self) -> ComposeResult:
         """Commander and timeout, the signal paths, the list, and the details of its choice."""
@@ -185,9 +196,7 @@ class ControlSourceScreen(OrderKeys):
     def on_mount(self) -> None:
         """Show the list, and read the present configuration again and again."""
         self._list()
-        found = self.query_one(OptionList)
-        found.display = bool(self._sources)
-        found.focus()
+        self.query_one(OptionList).focus()
         self._read_again(again=False)
         self.set_interval(REREAD_EVERY, self._read_again)
 
@@ -214,31 +223,44 @@ class ControlSourceScreen(OrderKeys):
         return raws if all(code in raws for code in source_codes(self.session.profile)) else {}
 
     def _list(self) -> None:
-        """List the configurations, with a mark at the active one."""
+        """List the steps and the configurations, with a mark at the active one."""
         if not (found := self.query(OptionList)):
             return  # the screen was left before it was composed
-        today = self._today()
-        if today is self._listed:
+        today, steps, staged = self._today(), self._paths.steps, self._staged
+        if (today, steps, staged) == self._listed:
             return
-        self._listed = today
-        options = found.first()
-        at = options.highlighted
-        if at is None:
-            at = self._sources.index(today) if today else 0
+        self._listed = (today, steps, staged)
+        options, chosen = found.first(), self._chosen
+        moved = options.highlighted != self._placed
+        self._rows = (*steps, *self._sources)
+        first = steps[0] if steps else today
+        kept = chosen if moved and chosen in self._rows else first
         options.clear_options()
-        for source in self._sources:
-            text = Text(no_wrap=True)
-            text.append(" ● " if source is today else " · ", STRONG if source is today else FAINT)
-            text.append(source.name, STRONG if source is today else PLAIN)
-            text.append("   active" if source is today else "", FAINT)
-            options.add_option(entry(text))
-        options.highlighted = at
+        options.display = bool(self._rows)
+        lines = [
+            step_row(row, staged=row.change in staged)
+            if isinstance(row, LineStep)
+            else source_row(row, active=row is today)
+            for row in self._rows
+        ]
+        options.add_options([entry(line) for line in lines])
+        if self._rows:
+            options.highlighted = self._rows.index(kept) if kept in self._rows else 0
+        self._placed = None if moved else options.highlighted
 
     @property
-    def _chosen(self) -> ControlSource | None:
-        if not self._sources:
-            return None
-        return self._sources[self.query_one(OptionList).highlighted or 0]
+    def _staged(self) -> list[SourceChange | None]:
+        """The changes of the steps that are staged on Parameters."""
+        if (editor := self.console.begun_editor) is None:
+            return []
+        edits = editor.staging.edits
+        changes = (step.change for step in self._paths.steps)
+        return [c for c in changes if c and (e := edits.get(c.parameter.code)) and e.new == c.new]
+
+    @property
+    def _chosen(self) -> LineStep | ControlSource | None:
+        at = self.query_one(OptionList).highlighted or 0
+        return self._rows[at] if at < len(self._rows) else None
 
     def on_option_list_option_highlighted(self) -> None:
         """Show the details of the configuration under the cursor."""
@@ -252,8 +274,8 @@ class ControlSourceScreen(OrderKeys):
         self.put_all("now", now)
         self.put_all("paths", paths)
         room = self.size.height - FRAME_ROWS - len(now) - len(paths)
-        if self._sources:
-            rows = max(LEAST_LISTED, min(len(self._sources), room - LEAST_DETAIL))
+        if self._rows:
+            rows = max(LEAST_LISTED, min(len(self._rows), room - LEAST_DETAIL))
             options = self.query_one(OptionList)
             if options.size.height != rows:
                 options.styles.height = rows
@@ -287,7 +309,12 @@ class ControlSourceScreen(OrderKeys):
         """The chosen configuration with its writes and notes, and the family's warnings."""
         warnings = warning_lines(self.session, width)
         lines: list[Text] = []
-        if (chosen := self._chosen) is not None:
+        chosen = self._chosen
+        if isinstance(chosen, LineStep) and chosen.change is not None:
+            writes = change_lines(self.session.profile, [chosen.change], width)
+            notes = [Text(f"   {line}", FAINT) for line in wrapped(PROPOSES, width - 4, 2)]
+            lines = [rule("Enter opens the parameter", width), *writes, *notes]
+        elif isinstance(chosen, ControlSource):
             found = source_changes(self.session.profile, chosen, self._raws)
             notes = note_lines(chosen, found, width)
             writes = change_lines(self.session.profile, found, width) if self._raws else []
@@ -320,9 +347,12 @@ class ControlSourceScreen(OrderKeys):
         """The active configuration; None if it is not listed, or was not read."""
         return source_in_force(self.session.profile, self._raws) if self._raws else None
 
-    def on_option_list_option_selected(self) -> None:
-        """Write on Enter in the list."""
-        self.action_write_chosen()
+    async def on_option_list_option_selected(self) -> None:
+        """Open the parameter of a step, or write a configuration."""
+        if isinstance(chosen := self._chosen, LineStep) and chosen.change is not None:
+            await self.app.open_parameter(chosen.change.parameter.code, chosen.change.new)
+        else:
+            self.action_write_chosen()
 
     def action_other_page(self) -> None:
         """Show the communication map."""
@@ -350,7 +380,7 @@ class ControlSourceScreen(OrderKeys):
 
     def action_write_chosen(self) -> None:
         """Ask, then write the chosen configuration."""
-        if (chosen := self._chosen) is None:
+        if not isinstance(chosen := self._chosen, ControlSource):
             return
         found = source_changes(self.session.profile, chosen, self._raws)
         if not self._raws:

@@ -10,7 +10,9 @@ from rich.text import Text
 from tui.drive.control_source import SourceChange
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import ControlSource
+from tui.drive.sentences import capitalized
 from tui.drive.shown import shown
+from tui.drive.signal_path import LineStep
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.drive_state import channel_text
 from tui.session.monitor.snapshot import Snapshot
@@ -98,6 +100,20 @@ def _channel(profile: Profile, latest: Snapshot | None) -> str:
         old=lambda value, age: f"was {channel_text(parameter, value)}",
         missing=NOT_AVAILABLE,
     )
+
+
+def step_row(step: LineStep, *, staged: bool) -> Text:
+    """Return the row of a step that makes this line a source."""
+    text = Text(" → ", ATTENTION, no_wrap=True)
+    text.append(capitalized(step.text), PLAIN)
+    return text.append("   staged" if staged else "", ATTENTION)
+
+
+def source_row(source: ControlSource, *, active: bool) -> Text:
+    """Return the row of a configuration, with a mark at the active one."""
+    text = Text(" ● " if active else " · ", STRONG if active else FAINT, no_wrap=True)
+    text.append(source.name, STRONG if active else PLAIN)
+    return text.append("   active" if active else "", FAINT)
 
 
 def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) -> list[Text]:

@@ -42,16 +42,19 @@ class EditNumber(Question[str | None]):
     ]
 
     def __init__(
-        self, editor: Editor, parameter: Parameter, now: MotorStates | None = None
+        self,
+        editor: Editor,
+        parameter: Parameter,
+        now: MotorStates | None = None,
+        proposed: int | None = None,
     ) -> None:
         super().__init__(now)
-        self._editor, self._parameter = editor, parameter
+        self._editor, self._parameter, self._proposed = editor, parameter, proposed
 
     def dialog(self) -> ComposeResult:
         """The field, the resulting value, and facts about the parameter."""
         editor, parameter = self._editor, self._parameter
-        staged = editor.staging.edits.get(parameter.code)
-        raw = staged.new if staged else editor.values.raws.get(parameter.code)
+        raw = first_raw(editor, parameter.code, self._proposed)
         value = editor.values.value_of(parameter.code, raw) if raw is not None else None
         with Vertical(id="dialog"):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
@@ -126,6 +129,14 @@ class EditNumber(Question[str | None]):
             self.answer(event.value.strip())
 
 
+def first_raw(editor: Editor, code: str, proposed: int | None) -> int | None:
+    """Return the raw value a dialog begins with: the proposed one, the staged, or the held."""
+    staged = editor.staging.edits.get(code)
+    if proposed is not None:
+        return proposed
+    return staged.new if staged else editor.values.raws.get(code)
+
+
 def about_number(editor: Editor, parameter: Parameter) -> str:
     """Return the present, staged and factory values, the active limits and the step."""
     now = f"drive holds {value_text(editor, parameter.code)}"
@@ -142,10 +153,14 @@ class PickValue(KeyQuestion[int | None]):
     """One of the names of an enumeration."""
 
     def __init__(
-        self, editor: Editor, parameter: Parameter, now: MotorStates | None = None
+        self,
+        editor: Editor,
+        parameter: Parameter,
+        now: MotorStates | None = None,
+        proposed: int | None = None,
     ) -> None:
         super().__init__(now)
-        self._editor, self._parameter = editor, parameter
+        self._editor, self._parameter, self._proposed = editor, parameter, proposed
         profile, values = editor.session.profile, editor.values
         self._names = sorted(profile.names(parameter).items())
         self._factory = factory_raw(profile, parameter, values.raws, values.lacking)
@@ -163,10 +178,8 @@ class PickValue(KeyQuestion[int | None]):
             yield Plain(hint(("Enter", "Stage"), STAGES_NOTHING), id="hint")
 
     def on_mount(self) -> None:
-        """Select the staged value, else the present one."""
-        code = self._parameter.code
-        staged = self._editor.staging.edits.get(code)
-        raw = staged.new if staged else self._editor.values.raws.get(code)
+        """Select the first value."""
+        raw = first_raw(self._editor, self._parameter.code, self._proposed)
         places = [place for place, (value, _) in enumerate(self._names) if value == raw]
         self.query_one(OptionList).highlighted = places[0] if places else 0
 
@@ -194,14 +207,16 @@ class EditBits(KeyQuestion[int | None]):
     ]
 
     def __init__(
-        self, editor: Editor, parameter: Parameter, now: MotorStates | None = None
+        self,
+        editor: Editor,
+        parameter: Parameter,
+        now: MotorStates | None = None,
+        proposed: int | None = None,
     ) -> None:
         super().__init__(now)
         self._parameter = parameter
-        staged = editor.staging.edits.get(parameter.code)
-        held = editor.values.raws.get(parameter.code, 0)
-        self._held = held & 0xFFFF
-        self._word = (staged.new if staged else held) & 0xFFFF
+        self._held = editor.values.raws.get(parameter.code, 0) & 0xFFFF
+        self._word = (first_raw(editor, parameter.code, proposed) or 0) & 0xFFFF
 
     def dialog(self) -> ComposeResult:
         """All named bits; reserved ones are disabled."""
@@ -247,13 +262,19 @@ Dialog = EditNumber | PickValue | EditBits
 
 
 def dialog_for(
-    editor: Editor, parameter: Parameter, now: MotorStates | None = None
+    editor: Editor,
+    parameter: Parameter,
+    now: MotorStates | None = None,
+    proposed: int | None = None,
 ) -> Callable[[], Dialog]:
-    """The dialog for a parameter's kind; a stop of the drives of `now` cancels it."""
+    """The dialog for a parameter's kind; a stop of the drives of `now` cancels it.
+
+    It begins with the `proposed` raw value, if there is one.
+    """
     from tui.drive.values import is_enumeration
 
     if parameter.bits:
-        return lambda: EditBits(editor, parameter, now)
+        return lambda: EditBits(editor, parameter, now, proposed)
     if is_enumeration(parameter):
-        return lambda: PickValue(editor, parameter, now)
-    return lambda: EditNumber(editor, parameter, now)
+        return lambda: PickValue(editor, parameter, now, proposed)
+    return lambda: EditNumber(editor, parameter, now, proposed)

@@ -18,13 +18,17 @@ class StageKeys(ParameterKeys):
 
     def action_edit(self) -> None:
         """Open a dialog for the parameter under the cursor."""
-        from .edit_value import dialog_for
-
         code = self.listed.code
         if code and self._only_teaches(code):
             self.ask_look(code)
-            return
-        if not code or not self._may_edit(code):
+        elif code:
+            self.edit(code)
+
+    def edit(self, code: str, proposed: int | None = None) -> None:
+        """Open a dialog for a parameter, with the `proposed` raw value instead of the held one."""
+        from .edit_value import dialog_for
+
+        if not self._may_edit(code):
             return
 
         def reported(answer: str | int | None) -> None:
@@ -33,7 +37,7 @@ class StageKeys(ParameterKeys):
 
         # a stop of the drive cancels the dialog, too, as it concerns its motor
         now = self.motor_state_text()
-        dialog = dialog_for(self.editor, self.session.profile[code], now)()
+        dialog = dialog_for(self.editor, self.session.profile[code], now, proposed)()
         self.app.push_screen(dialog, reported)
 
     def _only_teaches(self, code: str) -> bool:
