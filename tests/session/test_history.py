@@ -18,12 +18,8 @@ from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile, digest_of
 from tui.drive.values import from_words
 from tui.session.record.columns import gaps_of, history_columns, reach_of_points
-from tui.session.record.history import (
-    UNKNOWN_SCALE,
-    WITHOUT_VALUE,
-    HistoryPoint,
-    read_history,
-)
+from tui.session.record.decoding import UNKNOWN_SCALE, WITHOUT_VALUE, HistoryPoint
+from tui.session.record.history import read_history
 from tui.session.record.reader import RecordReader
 from tui.session.record.record_file import RAW_KEPT, RecordFile
 from tui.session.record.ring import files_of_line, record_path

@@ -110,4 +110,4 @@ class DriveConsole:
 
     def close(self) -> None:
         """Stop monitoring; the line stays open."""
-        self.monitor.stop()
+        self.monitor.close()

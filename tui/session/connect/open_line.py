@@ -9,6 +9,8 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Protocol
 
 from tui.bus.errors import LinkSyntaxError
@@ -52,6 +54,8 @@ class OpenLine:
     """By address, the report on each drive before the line is closed."""
     recorder: LineRecorder | None = None
     """Records what this process itself sends on the line; None if it does not."""
+    private: TemporaryDirectory[str] | None = None
+    """Folder of the record of a simulated line."""
 
     @property
     def label(self) -> str:
@@ -70,6 +74,20 @@ class OpenLine:
             self.recorder.close()
         if self.simulation is not None:
             self.simulation.stop()
+        if self.private is not None:
+            self.private.cleanup()
+
+    def record_privately(self) -> None:
+        """Record a simulated line until it is closed, outside the state folder."""
+        from .recorded_line import may_record, record_privately
+
+        if not may_record():
+            return
+        try:
+            self.private = TemporaryDirectory(prefix="drivepanel-", ignore_cleanup_errors=True)
+        except OSError:
+            return  # without a record, Trend shows what this program reads from now on
+        self.recorder = record_privately(self.line, Path(self.private.name))
 
 
 def open_line(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
 RECORD_SETTING = "DRIVEPANEL_RECORD"
 """Environment variable: `off` or `on`, instead of the settings file."""
 _OFF = ("off", "no", "0", "false")
+PRIVATE_NAME = "line"
+"""Name of the files of a line that is recorded in a folder of its own."""
 MOST_NAMES = 1000
 """Programs whose names are kept."""
 
@@ -55,20 +58,30 @@ def record_line(line: ModbusLine, name: str) -> LineRecorder | None:
     `name` is that of the line's files. Nothing is read or written before the first exchange, so a
     client of a keeper records nothing.
     """
-    return None if _by_environment() is False else RecordedEvents(line, name).recorder
+    return RecordedEvents(line, name).recorder if may_record() else None
+
+
+def record_privately(line: ModbusLine, folder: Path) -> LineRecorder:
+    """Record a line in a folder of its own, which the caller removes."""
+    return RecordedEvents(line, PRIVATE_NAME, folder).recorder
+
+
+def may_record() -> bool:
+    """True unless the environment turns the record off."""
+    return _by_environment() is not False
 
 
 class RecordedEvents:
     """Passes the events and notes of one line to its recorder, in any thread."""
 
-    def __init__(self, line: ModbusLine, name: str) -> None:
+    def __init__(self, line: ModbusLine, name: str, folder: Path | None = None) -> None:
         self._facts = line.facts
         self._programs: dict[str, Program] = {}
         self._commanders: dict[int, str] = {}
         self._names = {self._facts.me.id: self._facts.me.text}
         """Texts of all programs so far: rows of one that has left may still wait."""
         self.recorder = LineRecorder(
-            record_folder(),
+            folder or record_folder(),
             label(line.link),
             name,
             program=self._facts.me.text,

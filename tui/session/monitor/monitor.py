@@ -14,8 +14,10 @@ from dataclasses import replace
 
 from tui.bus.api import Contact, LineWorker, Priority, contact_of
 from tui.bus.errors import LineClosed, LineError, LineLost
+from tui.drive.chart import watched_codes
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
+from tui.drive.profile.profile import Profile
 from tui.safety import SHARED_AGE
 
 from ..drive import DriveSession
@@ -27,7 +29,14 @@ from ..shown import Quality
 from .rates import SLOW_FACTOR, Rates, bad_readings, rates_of
 from .snapshot import Snapshot, stale_after
 from .steady_cycles import SteadyCycles, SteadyPlan
-from .trend import Trend, TrendCycle, TrendNotes, TrendPoint
+from .trend import (
+    TREND_QUANTITIES,
+    Trend,
+    TrendCycle,
+    TrendNotes,
+    TrendPoint,
+    readout_parameter,
+)
 
 log = logging.getLogger(__name__)
 
@@ -81,6 +90,10 @@ class Monitor:
         self._trend = Trend(session.profile)
         self._notes = TrendNotes(session.line.facts, session.device, self._trend)
         self._listeners: tuple[Listener, ...] = ()
+        self._started: Rates | None = None
+        """Rates of `start`; None after `stop`."""
+        self._also: tuple[tuple[str, ...], ...] = ()
+        """Codes of each `also_read` that has not ended."""
         self._worker: LineWorker | None = None
 
     @property
@@ -134,26 +147,59 @@ class Monitor:
         `extra` codes are read at the slow rate: histories, inputs, hours. `period` is the target
         cycle time in seconds.
         """
-        self.stop()
-        self._notes.ask()
-        self.session.note_profile()  # with the scales that were learned since
         self.period = period
         rates = rates_of(self.profile) if codes is None else Rates(tuple(dict.fromkeys(codes)))
         known = {*rates.fast, *rates.changing, *rates.slow}
         more = tuple(code for code in dict.fromkeys(extra) if code not in known)
         if codes is None:
             more += tuple(c for c in deciding_codes(self.profile) if c not in {*known, *more})
-        rates = replace(rates, slow=rates.slow + more)
-        self._worker = self.line.spawn(
-            lambda: self._keep_watching(rates), f"monitor {self.profile.id} {self.device}"
-        )
+        self._started = replace(rates, slow=rates.slow + more)
+        self._begin()
+
+    def also_read(self, codes: Sequence[str], period: float) -> Callable[[], None]:
+        """Read these codes in each cycle, also while the monitor is not started.
+
+        Without `start` it polls them with the state of the drive and the values of its trend, each
+        `period` seconds. Returns a function that ends this.
+        """
+        also = tuple(codes)
+        if self._started is None:
+            self.period = period
+        self._also = (*self._also, also)
+        self._begin()
+
+        def end() -> None:
+            if any(item is also for item in self._also):
+                self._also = tuple(item for item in self._also if item is not also)
+                self._begin()
+
+        return end
 
     def stop(self) -> None:
-        """Stop polling; does not wait for an exchange in progress."""
+        """Stop polling, except for `also_read`; does not wait for an exchange in progress."""
+        self._started = None
+        self._begin()
+
+    def close(self) -> None:
+        """Stop polling."""
+        self._also = ()
+        self.stop()
+
+    def _begin(self) -> None:
+        """Poll by the present rates from now on; stop if there are none."""
         if self._worker is not None:
             self._worker.cancel()
             self._worker = None
         self._notes.end()
+        if self._started is None and not self._also:
+            return
+        self._notes.ask()
+        self.session.note_profile()  # with the scales that were learned since
+        rates = self._started or Rates(_codes_of_state(self.profile))
+        rates = rates.with_fast([code for codes in self._also for code in codes])
+        self._worker = self.line.spawn(
+            lambda: self._keep_watching(rates), f"monitor {self.profile.id} {self.device}"
+        )
 
     async def _keep_watching(self, rates: Rates) -> None:
         """Poll until cancelled; report an internal error and restart after it."""
@@ -320,6 +366,14 @@ class Monitor:
         self._latest = snapshot
         self.add_to_trend(snapshot)
         self._hand_out(snapshot)
+
+
+def _codes_of_state(profile: Profile) -> tuple[str, ...]:
+    """Return the codes of the drive's state, its fault, and the values of its trend."""
+    found = (readout_parameter(profile, quantity) for quantity in TREND_QUANTITIES)
+    codes = [*watched_codes(profile), profile.data.faults.parameter]
+    codes += [parameter.code for parameter in found if parameter is not None]
+    return tuple(dict.fromkeys(code for code in codes if code))
 
 
 def _span(begun: Sequence[float], period: float) -> float:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from tui.drive.chart import fault_code, watched_codes
 from tui.drive.profile.profile import Profile
@@ -29,6 +30,16 @@ class Rates:
     def seldom(self) -> tuple[str, ...]:
         """Values that are not read in every cycle."""
         return (*self.changing, *self.slow)
+
+    def with_fast(self, codes: Sequence[str]) -> Rates:
+        """Return rates with these codes in each cycle, too."""
+        more = tuple(code for code in dict.fromkeys(codes) if code not in self.fast)
+        return replace(
+            self,
+            fast=self.fast + more,
+            changing=tuple(code for code in self.changing if code not in more),
+            slow=tuple(code for code in self.slow if code not in more),
+        )
 
 
 def bad_readings(profile: Profile, rates: Rates, now: float, why: str) -> dict[str, Reading]:

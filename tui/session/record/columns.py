@@ -8,7 +8,7 @@ from itertools import pairwise
 from statistics import median
 from typing import NamedTuple
 
-from .history import HistoryPoint
+from .decoding import HistoryPoint
 from .reduction import REDUCED_OVER
 
 GAP_POINTS = 3
@@ -67,13 +67,14 @@ def _column(points: Sequence[HistoryPoint]) -> HistoryColumn | None:
 def reach_of_points(points: Sequence[HistoryPoint]) -> float:
     """Return the longest time, in seconds, between two points without a gap.
 
-    It is GAP_POINTS times their usual distance, and at least two reduced points' if there are any.
+    It is GAP_POINTS times their usual distance; with reduced points at least two of their windows.
     """
-    raw = [point.time for point in points if not point.reduced]
-    apart = [b - a for a, b in pairwise(raw[-SAMPLED_DISTANCES:]) if b > a]
-    reach = GAP_POINTS * median(apart) if apart else 0.0
-    if any(point.reduced for point in points):
-        reach = max(reach, 2 * REDUCED_OVER / 1e6)
+    reach = 0.0
+    for reduced in (False, True):
+        times = [point.time for point in points if point.reduced is reduced][-SAMPLED_DISTANCES:]
+        apart = [b - a for a, b in pairwise(times) if b > a]
+        least = 2 * REDUCED_OVER / 1e6 if reduced and times else 0.0
+        reach = max(reach, GAP_POINTS * median(apart) if apart else 0.0, least)
     return reach
 
 

@@ -9,61 +9,40 @@ from __future__ import annotations
 import json
 import sqlite3
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 from tui.drive.errors import ProfileError, UnknownProfile
 from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile, digest_of
 from tui.drive.profile.schema import Parameter
-from tui.drive.shown import depends_on, number_of
-from tui.drive.values import from_words, is_enumeration, is_field, word_count
+from tui.drive.shown import depends_on
+from tui.drive.values import from_words, is_field, word_count
 
+from .decoding import (
+    NO_GOOD_REPLY,
+    NOT_KEPT,
+    WITHOUT_VALUE,
+    HistoryPoint,
+    PointDecoder,
+    RawPoint,
+    ScaleWords,
+)
 from .reader import RecordReader, ReducedWords
 from .reduction import REDUCED_OVER, Extent, extent_of
 from .ring import SECONDS_A_DAY, day_of_record
-from .schema import QUALITIES, REFUSED, RecordDamaged
+from .schema import QUALITIES, REFUSED, EventRow, RecordDamaged
 
 SOURCES_BEFORE = 3600.0
 """Seconds before the time in which a word that determines a scale is searched."""
-WITHOUT_VALUE = "no value"
-"""Quality of a reply with the word of the family for "no value", perhaps in a part of 10 s."""
-NO_GOOD_REPLY = "no good reply"
-UNKNOWN_SCALE = "scale not recorded"
-NOT_KEPT = "changed within 10 s"
-"""Quality of a part of a word that changed: the record has no extent of it."""
-OTHER_UNIT = "in another unit"
 _GOOD = QUALITIES[0]
 _WORD = 0x10000
 Row = TypeVar("Row")
-
-
-class HistoryPoint(NamedTuple):
-    """One reply, or the replies of up to 10 s; times in seconds since 1970."""
-
-    time: float
-    """Time of the reply; the first request of a reduced point."""
-    end: float
-    """The same as `time`, or the end of the last reply of a reduced point."""
-    least: float | None
-    """None, as the next two, if there is no value; `quality` gives the reason."""
-    mean: float | None
-    most: float | None
-    quality: str = _GOOD
-    good: int = 1
-    bad: int = 0
-    """Numbers of good replies and of others."""
-    reduced: bool = False
-    exact: bool = True
-    """False if the values may lie within `least` and `most`: a value of two registers whose high
-    word changed."""
-    raw: int | None = None
-    """The raw value, if it is one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,21 +55,6 @@ class History:
     """The parameter, as the last profile describes it."""
     troubles: Sequence[str] = ()
     """Reasons why files were not read or values not decoded, as sentences."""
-
-
-@dataclass(slots=True)
-class _RawPoint:
-    """A point before it is decoded; times in microseconds."""
-
-    time: int
-    end: int
-    extent: Extent | None
-    quality: str = _GOOD
-    good: int = 1
-    bad: int = 0
-    reduced: bool = False
-    exact: bool = True
-    raw: int | None = None
 
 
 @dataclass(slots=True)
@@ -150,7 +114,7 @@ def read_history(
         sources = {
             source: _source(work, profile, source, since, until) for source in depends_on(entry)
         }
-        decoder = _Decoder(profile, entry, sources)
+        decoder = PointDecoder(profile, entry, sources)
         own_time = partial(_in_force, periods, profile)
         raws = _raw_points(work, profile, entry, since, until)
         found = [decoder.point(raw) for raw in raws if own_time(raw.time)]
@@ -208,11 +172,6 @@ def _in_force(periods: Periods, profile: Profile, utc: int) -> bool:
     return periods[at][1] is profile
 
 
-ScaleWords = Sequence[tuple[int, int | None, bool]]
-"""Raw values of a word that determines a scale, by time in microseconds; None if unknown, and True
-if the drive has no such word."""
-
-
 def _source(work: _Reading, profile: Profile, code: str, since: float, until: float) -> ScaleWords:
     raws = _raw_points(work, profile, profile[code], since - SOURCES_BEFORE, until)
     found = []
@@ -227,11 +186,11 @@ def _source(work: _Reading, profile: Profile, code: str, since: float, until: fl
 
 def _raw_points(
     work: _Reading, profile: Profile, entry: Parameter, since: float, until: float
-) -> list[_RawPoint]:
+) -> list[RawPoint]:
     """Return the points of a parameter: each reply once, as it was or reduced."""
     times = round(since * 1e6), round(until * 1e6)
 
-    def read(reader: RecordReader) -> Iterable[_RawPoint]:
+    def read(reader: RecordReader) -> Iterable[RawPoint]:
         return _points_of_file(reader, work.device, profile, entry, times)
 
     return work.rows(since - REDUCED_OVER / 1e6, until, read)
@@ -239,7 +198,7 @@ def _raw_points(
 
 def _points_of_file(
     reader: RecordReader, device: int, profile: Profile, entry: Parameter, times: tuple[int, int]
-) -> Iterable[_RawPoint]:
+) -> Iterable[RawPoint]:
     """Yield the points of one file.
 
     Rows may expire while it is read. So the replies are read first: what expired before its turn,
@@ -262,12 +221,12 @@ def _points_of_file(
             continue
         end = reply.utc + reply.took
         if reply.words is None:
-            yield _RawPoint(end, end, None, reply.quality, 0, 1)
+            yield RawPoint(end, end, None, reply.quality, 0, 1)
         elif unknown in reply.words and reply.registers != count:
-            yield _RawPoint(end, end, None, WITHOUT_VALUE, 0, 1)
+            yield RawPoint(end, end, None, WITHOUT_VALUE, 0, 1)
         else:
             raw = from_words(entry, reply.words)
-            yield _RawPoint(end, end, Extent(raw, raw, raw), raw=raw)
+            yield RawPoint(end, end, Extent(raw, raw, raw), raw=raw)
 
 
 def _is_covered(spans: Sequence[tuple[int, int]], mono: int) -> bool:
@@ -275,8 +234,8 @@ def _is_covered(spans: Sequence[tuple[int, int]], mono: int) -> bool:
     return at >= 0 and mono <= spans[at][1]
 
 
-def _reduced_point(row: ReducedWords, entry: Parameter, profile: Profile) -> _RawPoint:
-    point = _RawPoint(row.utc, row.utc + row.took, None, "", row.good, row.bad, reduced=True)
+def _reduced_point(row: ReducedWords, entry: Parameter, profile: Profile) -> RawPoint:
+    point = RawPoint(row.utc, row.utc + row.took, None, "", row.good, row.bad, reduced=True)
     if row.blob is None:
         point.quality = NO_GOOD_REPLY
         return point
@@ -331,69 +290,21 @@ def _joined(high: Extent, low: Extent) -> tuple[Extent, bool]:
     return joined, high.least == high.most
 
 
-@dataclass(slots=True)
-class _Decoder:
-    """Makes engineering values of raw ones, with the scale of their time."""
+def recorded_events(files: Sequence[Path], since: float, until: float) -> list[EventRow]:
+    """Return the events of a time, from all files that can be read."""
+    work = _Reading(files, 0, None)
+    times = round(since * 1e6), round(until * 1e6)
+    return work.rows(since, until, lambda reader: reader.events(*times))
 
-    profile: Profile
-    entry: Parameter
-    sources: Mapping[str, ScaleWords]
-    unit: str = field(init=False, default="")
-    """Unit of the first value, and of all others that are not gaps."""
-    _raws: dict[str, int] = field(init=False, default_factory=dict)
-    _absent: set[str] = field(init=False, default_factory=set)
 
-    def point(self, raw: _RawPoint) -> HistoryPoint:
-        """Return a point with its values."""
-        if raw.extent is None:
-            return self._gap(raw, raw.quality)
-        self._set_sources(raw.time)
-        least, most = (self._number(end) for end in (raw.extent.least, raw.extent.most))
-        if least is None or most is None:
-            return self._gap(raw, UNKNOWN_SCALE)
-        unit = self._unit()
-        if self.unit and unit != self.unit:
-            return self._gap(raw, OTHER_UNIT)
-        self.unit = unit
-        mean = self._mean(raw.extent, least, most)
-        return HistoryPoint(
-            raw.time / 1e6, raw.end / 1e6, min(least, most), mean, max(least, most), raw.quality,
-            raw.good, raw.bad, raw.reduced, raw.exact, raw.raw,
-        )  # fmt: skip
-
-    def _gap(self, raw: _RawPoint, why: str) -> HistoryPoint:
-        return HistoryPoint(
-            raw.time / 1e6, raw.end / 1e6, None, None, None, why,
-            raw.good, raw.bad, raw.reduced, raw.exact, raw.raw,
-        )  # fmt: skip
-
-    def _set_sources(self, utc: int) -> None:
-        for code, source in self.sources.items():
-            at = bisect_right(source, utc, key=lambda item: item[0]) - 1
-            _, raw, missing = source[at] if at >= 0 else (0, None, False)
-            self._raws.pop(code, None)
-            self._absent.discard(code)
-            if raw is not None:
-                self._raws[code] = raw
-            if missing:
-                self._absent.add(code)
-
-    def _number(self, raw: int) -> float | None:
-        if self.entry.bits or is_enumeration(self.entry):
-            return float(raw)
-        number = number_of(self.profile, self.entry, raw, self._raws, self._absent)
-        return None if number is None else float(number)
-
-    def _unit(self) -> str:
-        if self.entry.bits or is_enumeration(self.entry):
-            return ""
-        if (taught := self.profile.taught.get(self.entry.code)) is not None:
-            return taught.unit
-        return self.profile.unit(self.entry, self._raws)
-
-    def _mean(self, extent: Extent, least: float, most: float) -> float:
-        """Return the mean between two ends; scales are linear."""
-        if extent.least == extent.most:
-            return least
-        share = (extent.mean - extent.least) / (extent.most - extent.least)
-        return least + share * (most - least)
+def oldest_reply(files: Sequence[Path], devices: Collection[int]) -> float | None:
+    """Return the time of the oldest recorded read of some drives; None without any."""
+    for path in files:
+        try:
+            with closing(RecordReader(path)) as reader:
+                found = [reader.oldest(device) for device in devices]
+        except (sqlite3.Error, RecordDamaged, OSError):
+            continue
+        if times := [utc for utc in found if utc is not None]:
+            return min(times) / 1e6
+    return None

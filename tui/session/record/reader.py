@@ -151,6 +151,16 @@ class RecordReader:
         ).fetchone()
         return None if found is None else (found[0], found[1])
 
+    def oldest(self, device: int) -> int | None:
+        """Return the `utc` of the oldest read of a drive, as it was or reduced; None without."""
+        times = [
+            self._base.execute(
+                f"SELECT min(utc) FROM {table} WHERE device = ?", (device,)
+            ).fetchone()[0]
+            for table in ("reply", "reduced")
+        ]
+        return min((utc for utc in times if utc is not None), default=None)
+
     def profiles(self, device: int) -> list[tuple[int, str]]:
         """Return the events that name the profile of a drive, with their `utc`."""
         rows = self._base.execute(

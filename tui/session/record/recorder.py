@@ -144,6 +144,13 @@ class LineRecorder:
         thread.join(timeout)
         return not thread.is_alive()
 
+    def files(self) -> list[Path]:
+        """Return the files of this line, the oldest day first; raises OSError.
+
+        Another process may have written them, such as the keeper of the line.
+        """
+        return files_of_line(self._folder, self._name)
+
     @property
     def waiting(self) -> int:
         """Number of items that wait for the disk."""
