@@ -16,7 +16,7 @@ from tui.drive.settings.selection import Choice, FilterId, chosen_codes, group_o
 from tui.screens.blocks.view import table_lines
 from tui.screens.choosing import AROUND_PALETTE, WIDEST_PALETTE, action_lines
 from tui.screens.command.teaching import teach_lines
-from tui.screens.control.view import change_lines
+from tui.screens.control.view import change_lines, source_row
 from tui.screens.dialogs.pick_parameter import (
     AROUND,
     BESIDE_NAME,
@@ -27,6 +27,13 @@ from tui.screens.dialogs.pick_parameter import (
 from tui.screens.faults.doctor import doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
 from tui.screens.faults.parts import LABEL
+from tui.screens.faults.value_rows import (
+    CODE_WIDTH,
+    LEAST_NOW,
+    LEAST_TRIP,
+    WIDEST_ROW,
+    value_rows,
+)
 from tui.screens.faults.view import stored_lines
 from tui.screens.keys.finding import find
 from tui.screens.keys.screens import SCREENS
@@ -36,7 +43,7 @@ from tui.screens.parameters.parameter_list import FIRST, LAST, ParameterList
 from tui.screens.parameters.screen import NARROW, WIDE
 from tui.screens.parameters.table_view import head_line, items_of, layout_of, row_line
 from tui.session.settings.editor import Editor
-from tui.widgets.drawing import fitted_names
+from tui.widgets.drawing import DENIES, fitted_names
 
 from . import fakes
 from .test_block_pictures import desk_on, view_of
@@ -134,6 +141,39 @@ def test_names_without_room_stay_apart() -> None:
         fitted = fitted_names(names, width)
         assert len(set(fitted.values())) == len(names), width
         assert max(map(len, fitted.values())) <= width
+
+
+@pytest.mark.parametrize("width", [24, 28])
+def test_shortened_name_keeps_the_word_that_denies_it(width: int) -> None:
+    """'Pulse threshold…run command' meant the opposite of the whole name."""
+    for family in FAMILIES:
+        profile = library.load(family)
+        for group in profile.groups:
+            names = tuple(p.name for p in profile.parameters if p.group == group)
+            fitted = fitted_names(names, width)
+            for name in names:
+                assert len(DENIES.findall(name)) == len(DENIES.findall(fitted[name])), fitted[name]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_values_of_a_fault(family: str) -> None:
+    profile = library.load(family)
+    for fault in profile.data.faults.codes:
+        view = DoctorView(profile, fault, True, None, {}, fakes.NOW)
+        for width in WIDTHS.values():
+            lines = [line.plain for line in value_rows(view, width)[1:]]
+            room = min(width, WIDEST_ROW) - LEAST_TRIP - LEAST_NOW
+            assert alike([line[2 + CODE_WIDTH : room].strip() for line in lines]) == [], width
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_values_and_configurations_to_choose(family: str) -> None:
+    profile = library.load(family)
+    for parameter in profile.parameters:
+        assert alike([*profile.names(parameter).values()]) == [], parameter.code
+    names = [source_row(s, active=True).plain for s in profile.data.control_sources]
+    assert alike(names) == []
+    assert max(map(len, names), default=0) <= min(WIDTHS.values())
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import textwrap
 from bisect import bisect_left, bisect_right
 from collections.abc import Callable, Collection, Mapping, Sequence
@@ -59,6 +60,10 @@ def cut_at_word(text: str, width: int) -> str:
 
 ARTICLES = frozenset(("a", "an", "the"))
 """Words that a name loses first if it is too long."""
+DENIES = re.compile(r"\b(?:without|not|no)\b", re.IGNORECASE)
+"""Words without which the rest of a name would mean the opposite."""
+DENIAL_CUTS = 10
+"""Cuts between words that the loss of such a word outweighs."""
 
 
 @lru_cache(maxsize=64)
@@ -95,16 +100,20 @@ def _is_own(form: str, names: Sequence[str]) -> bool:
 def _without_middle(text: str, width: int) -> list[str]:
     """Return the ways to shorten a text to so many cells by a part in its middle, the best first.
 
-    A cut between words is better, and one in the middle of the width.
+    A cut between words is better, and one in the middle of the width. A word that denies the rest
+    stays if any cut keeps it.
     """
     if len(text) <= width:
         return [text]
-    found = []
+    found, denials = [], len(DENIES.findall(text))
     for head in range(1, width - 1):
         for tail in range(max(1, width - head - 4), width - head):
             if text[head - 1] == " " or text[-tail] == " ":
                 continue
             cuts = (text[head] != " ") + (text[-tail - 1] != " ")
+            if denials:
+                kept = len(DENIES.findall(f"{text[:head]}…{text[-tail:]}"))
+                cuts += DENIAL_CUTS * (denials - kept)
             found.append((3 * cuts + (width - head - tail) + abs(head - tail) / 4, head, tail))
     return [f"{text[:head]}…{text[-tail:]}" for _, head, tail in sorted(found)] or [text[:width]]
 
