@@ -591,7 +591,7 @@ def test_question_that_appears_on_its_own_accepts_an_answer_after_a_second(
 ) -> None:
     clock = SimpleNamespace(monotonic=lambda: after)
     question = SimpleNamespace(
-        _drawn=0.0, _typed_at=-9.0, by_itself=True, app=SimpleNamespace(clock=clock)
+        _drawn=0.0, _typed_at=-9.0, by_itself=True, app=SimpleNamespace(panel_clock=clock)
     )
     assert Question._is_early(cast(Any, question)) is early
 

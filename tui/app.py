@@ -31,6 +31,7 @@ from .screens.line_check import LineCheck
 from .screens.line_owner import LineOwner, Opener
 from .screens.open_lines import LineOpening
 from .screens.parameter_places import ParameterPlaces
+from .screens.replay_keys import ReplayKeys
 from .screens.status_refresher import FRAME_LOOK, StatusRefresher
 
 if TYPE_CHECKING:
@@ -43,6 +44,7 @@ LONGEST_CAUSE = 120
 class DrivePanelApp(
     LastWords,
     KeyDispatcher,
+    ReplayKeys,
     StatusRefresher,
     LineOwner,
     LineCheck,
@@ -81,7 +83,7 @@ class DrivePanelApp(
     ) -> None:
         super().__init__()
         self.fit_terminal(abilities, slow=low_bandwidth)
-        self.clock = clock or Clock()
+        self.panel_clock = clock or Clock()
         self.read_only = read_only
         self.low_bandwidth = low_bandwidth
         self.mouse = mouse

@@ -24,7 +24,7 @@ from .commands import ended, invoked, tcp_line
 from .printed import documents, form_of, forms, forms_of
 
 SCHEMA = Path(__file__).resolve().parents[2] / "docs" / "cli.schema.json"
-NO_JSON = {"demo"}
+NO_JSON = {"demo", "replay"}
 """Commands that print nothing: the panel."""
 DRIVE = ("sim:atv71@2", "-d", "2")
 

@@ -171,7 +171,7 @@ async def test_new_state_moves_nothing_in_a_long_drive_list(
         assert (drives.scroll_offset, drives.highlighted) == (before, 25)
         assert "■ FAULT OHF" in str(drives.get_option("26").prompt)
         # a drive in fault keeps its place, too
-        app.clock.monotonic = lambda: fakes.NOW + QUIET  # type: ignore[method-assign]
+        app.panel_clock.monotonic = lambda: fakes.NOW + QUIET  # type: ignore[method-assign]
         screen._typed_at = fakes.NOW
         screen.show_drives()
         assert [option.id for option in drives.options][:3] == ["1", "2", "3"]

@@ -358,7 +358,10 @@ async def back_to(made: Bench, screen: str) -> None:
 
 # Keys that act before they are known to be single
 
-SHOW_EVERYWHERE = {*"1234567", *"&é\"'(è", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l"}
+REPLAY_KEYS = {*"0;{}$#@", "comma"}
+SHOW_EVERYWHERE = {
+    *"1234567", *"&é\"'(è", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l", *REPLAY_KEYS
+}  # fmt: skip
 ARROWS = {"up", "down", "pageup", "pagedown"}
 SHOW = {
     "line": set(),

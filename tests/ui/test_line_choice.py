@@ -238,7 +238,7 @@ class HandClock(fakes.StillClock):
 async def test_sorting_waits_while_keys_are_typed() -> None:
     app = fakes.app_of()
     clock = HandClock()
-    app.clock = clock
+    app.panel_clock = clock
     async with app.run_test(size=(80, 24)) as pilot:
         app.opened = fakes.opened()
         app.fleet = fleet = fakes.StillFleet(*drives(4, 7).values())

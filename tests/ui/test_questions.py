@@ -84,7 +84,7 @@ class OpenQuestion:
         self.question = question
         self.app = fakes.app_of()
         self.clock = HandClock()
-        self.app.clock = self.clock
+        self.app.panel_clock = self.clock
         self.answers: list[object] = []
 
     async def put(self, pilot: Any) -> None:

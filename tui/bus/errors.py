@@ -224,5 +224,13 @@ class DeviceException(ExchangeError):
         super().__init__(device, function, address, text)
 
 
+class NotRecorded(DeviceException):
+    """A replay has no value of these registers, because they were not read by then."""
+
+    def __init__(self, device: int, function: int, address: int) -> None:
+        super().__init__(device, function, address, 0)
+        self.args = ("Not read by then: the record has no value.",)
+
+
 HOPELESS = (PortBusy, PortMissing, PortRefused, NotShared)
 """Failures that do not end by waiting."""

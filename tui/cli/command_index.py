@@ -24,6 +24,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "read": ("read", "Read parameters from a drive."),
     "record": ("record", "Record values to a file, always or around triggers."),
     "reference": ("single_orders", "Set a drive's reference."),
+    "replay": ("replay", "Show a record on the screens of the panel."),
     "report": ("report", "Write a report on a drive to a file."),
     "reset": ("single_orders", "Reset a drive's fault."),
     "restore": ("restore", "Restore a parameter set to a drive."),

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.events import Event, EventLog
     from tui.session.fleet import Fleet
+    from tui.session.record.replay_line import ReplayLine
     from tui.terminal.stroke import Stroke
     from tui.widgets.strip import FrameView
 
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 class Panel(LeanApp):
     """The app as its screens see it: open lines, the line that is shown, their drives."""
 
-    clock: Clock
+    panel_clock: Clock
+    """The real clock, for keys, questions and drives; a test may replace it."""
     read_only: bool
     low_bandwidth: bool
     """True if as little as possible is to be sent to the terminal."""
@@ -92,6 +94,16 @@ class Panel(LeanApp):
         self.tell("Ctrl+C does not end the panel. Press q to quit.")
 
     @property
+    def clock(self) -> Clock:
+        """The clock of what is shown: in a replay, its own."""
+        return self.panel_clock if self.replay is None else self.replay.clock
+
+    @property
+    def replay(self) -> ReplayLine | None:
+        """The replay that is shown; None if a live line is, or none."""
+        return self.opened.replay if self.opened is not None else None
+
+    @property
     def line_text(self) -> str:
         """The open line as it was typed, or nothing."""
         return self.opened.text if self.opened else ""
@@ -106,6 +118,12 @@ class Panel(LeanApp):
         """The drives of every open line, of the one that is shown first."""
         shown = [self.fleet] if self.fleet is not None else []
         return [*shown, *(line.fleet for line in self.panel_lines if line.fleet is not self.fleet)]
+
+    @property
+    def live_fleets(self) -> list[Fleet]:
+        """The drives of every open line that exists: those of a replay cannot be stopped."""
+        replays = {id(line.fleet) for line in self.panel_lines if line.opened.replay is not None}
+        return [fleet for fleet in self.fleets if id(fleet) not in replays]
 
     @property
     def open_texts(self) -> list[str]:

@@ -189,8 +189,8 @@ def ask_bundle(app: Panel) -> None:
     subject = partial(_subject, app, text, link, opened, trouble, _screens(app))
     from tui.session.bundle.subject import bundle_name
 
-    simulated = opened is not None and opened.simulation is not None
-    stem = bundle_name(None if simulated else link, datetime.fromtimestamp(app.clock.wall()))
+    simulated = opened is not None and not opened.is_real
+    stem = bundle_name(None if simulated else link, datetime.fromtimestamp(app.panel_clock.wall()))
     dialog = Ask(
         "Save the bundle as",
         fault_of_new,

@@ -23,6 +23,7 @@ from tui.terminal.names import STOP_KEYS
 from tui.widgets.drawing import key_line, wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
+from tui.widgets.replay_bar import replay_line, time_line
 from tui.widgets.small import is_too_small, small_lines
 from tui.widgets.strip import BarMessage, FrameView, Tab, message_line, strip_line, tabs_line
 
@@ -95,9 +96,14 @@ class Framed(Screen[Any]):
         here = TAB_OF_PAGE.get(here, here)
         lead = not self.takes_letters
         news = view.message is not None or not view.not_stopped
+        replay = view.strip.replay
         parts = {
-            "strip": [strip_line(view.strip, width)],
-            "tabs": [tabs_line(TABS, here, view.marks, width, lead=lead)],
+            "strip": [replay_line(replay, width) if replay else strip_line(view.strip, width)],
+            "tabs": [
+                time_line(replay, width)
+                if replay
+                else tabs_line(TABS, here, view.marks, width, lead=lead)
+            ],
             "said": [
                 *not_stopped_lines(view.not_stopped, width),
                 *(message_lines(view.message, width, lead=lead) if news else ()),

@@ -12,7 +12,8 @@ from rich.style import Style
 from tui.drive.sentences import counted
 from tui.safety import LOOK_IS_OLD
 from tui.session.command.stop_report import NOT_STOPPED
-from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, age_text
+from tui.widgets.replay_bar import ReplayView
 from tui.widgets.strip import BarMessage, DriveNow, FrameView, StripView
 
 from .frame import at, with_drive
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from tui.session.events import Event
     from tui.session.fleet import Fleet
     from tui.session.monitor.look import Look
+    from tui.session.record.replay_line import ReplayLine
     from tui.session.shown import Shown
 
     from .app_port import Panel
@@ -71,6 +73,8 @@ def repeats(message: str, texts: Iterable[str]) -> bool:
     return head.startswith("NOT STOPPED") and any(text.endswith(why) for text in texts)
 
 
+REPLY_SHOWN = 8.0
+"""Seconds for which the reply to a key is shown in a replay."""
 LOAD_OVER = 2.0
 """Seconds over which the load of the line is measured."""
 NO_ANSWER_YET = (
@@ -102,19 +106,40 @@ class FrameSource:
         strip = StripView(
             drive=drive,
             line=self._line(fleet),
-            faults=sum(len(item.alarms.active) for item in app.fleets),
-            unseen=any(item.alarms.unseen for item in app.fleets),
+            faults=sum(len(item.alarms.active) for item in app.live_fleets),
+            unseen=any(item.alarms.unseen for item in app.live_fleets),
             load=self._measured(now),
             clock=app.clock.time_of_day(),
             read_only=app.read_only,
             off_record=bool(app.journal_trouble),
             trouble=fleet.health.troubles[0].signs if fleet and fleet.health.troubles else (),
+            replay=self._replay(drive),
         )
         marks = _marks(console, fleet)
-        news, not_stopped = self._message(console, now), not_stopped_texts(app, now)
+        news, not_stopped = (
+            self._message(console, now),
+            not_stopped_texts(app, app.panel_clock.monotonic()),
+        )
         if news is not None and repeats(news.text, not_stopped):
             news = None
         return FrameView(strip, app.place, marks, news, not_stopped)
+
+    def _replay(self, drive: DriveNow | None) -> ReplayView | None:
+        """Return the replay that is shown; None if the drives are live."""
+        replay = self._app.replay
+        if replay is None:
+            return None
+        clock = replay.clock
+        shown = replay.path.name
+        if drive is not None:
+            name = drive.name or drive.model
+            shown = f"{drive.device} {name} was {drive.words}"
+            if drive.age is not None:
+                shown = f"{drive.device} {name} was last read {age_text(drive.age)} before"
+        events = tuple((event.utc / 1e6, event.kind) for event in replay.events)
+        return ReplayView(
+            clock.begin, clock.end, clock.monotonic(), clock.speed, clock.playing, shown, events
+        )
 
     def _line(self, fleet: Fleet | None) -> str:
         if not self._app.line_label:
@@ -151,10 +176,12 @@ class FrameSource:
 
     def _message(self, console: DriveConsole | None, now: float) -> BarMessage | None:
         """Return the state with priority over messages: a lost line, a silent drive."""
-        holds = self._line_trouble(now) or self._not_heard() or self._trouble_below(now)
+        holds = self._line_trouble(now) or self._not_heard() or self._trouble_below()
         if holds:
             return BarMessage(self._app.clock.time_of_day(), holds, "alarm", 0.0)
         event = self._event()
+        if self._app.replay is not None:
+            return self._in_replay(event, self._app.replay)
         outcome = console.session.work.outcome if console is not None else None
         if outcome is not None and outcome.kind == "working":
             return BarMessage(
@@ -169,6 +196,22 @@ class FrameSource:
         if message is event and place == self._app.place:
             text = f"{text} {keys}".strip()  # only here: keys differ between screens
         return BarMessage(at(event.wall), text, event.kind, time.time() - event.wall, there)
+
+    def _in_replay(self, event: Event | None, replay: ReplayLine) -> BarMessage | None:
+        """Return the newest message about a live line or a key; else the next recorded event."""
+        age = time.time() - event.wall if event is not None else math.inf
+        is_live = event is not None and event.device is not None and self._app.live_fleets
+        if event is not None and (is_live or age < REPLY_SHOWN):
+            text = f"LIVE: {with_drive(event)}" if is_live else event.text
+            return BarMessage(at(event.wall), text, event.kind, age, there=bool(is_live))
+        now = replay.clock.monotonic()
+        following = next((item for item in replay.events if item.utc / 1e6 > now), None)
+        if following is None:
+            return None
+        wall = following.utc / 1e6
+        drive = f"drive {following.device}: " if following.device else ""
+        text = f"Next: {drive}{following.text} In {wall - now:.0f} s."
+        return BarMessage(at(wall), text, "next", 0.0)
 
     def _event(self) -> Event | None:
         """Return the newest event that concerns the screen on top; None without one.
@@ -196,10 +239,12 @@ class FrameSource:
         outcomes = (console.session.work.outcome for console in consoles if console is not None)
         return all(o is None or o.text != event.text or o.error is None for o in outcomes)
 
-    def _trouble_below(self, now: float) -> str:
+    def _trouble_below(self) -> str:
         """The first trouble of the open lines that are not shown; empty if none."""
+        now = self._app.panel_clock.monotonic()
         for line in self._app.panel_lines:
-            if line.opened is not self._app.opened and (
+            hidden = line.opened is not self._app.opened and line.opened.replay is None
+            if hidden and (
                 trouble := self._line_trouble(now, line.opened) or self._not_heard(line.fleet)
             ):
                 return f"{line.opened.label}: {trouble}"

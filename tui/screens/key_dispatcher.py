@@ -16,13 +16,18 @@ from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
 from tui.terminal.stroke import stroke_of
+from tui.widgets.replay_bar import NO_MOTOR
 from tui.widgets.small import is_too_small
 
 from .app_port import Panel
 from .harmless_keys import HarmlessKeys
-from .keys.table import STOPS_ALL, STOPS_NONE
+from .keys.action import CONNECTION, LINE_ONLY_IN_REPLAY, NOT_IN_REPLAY
+from .keys.table import STOPS_ALL, STOPS_LIVE, STOPS_NONE
 
 if TYPE_CHECKING:
+    from textual.actions import ActionParseResult
+    from textual.dom import DOMNode
+
     from tui.drive.profile.schema import OrderId
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
@@ -36,6 +41,9 @@ NO_STOP_HERE = (
     " listening."
 )
 NOBODY_TO_STOP = "Nothing was stopped: no drive is known."
+NOBODY_IN_REPLAY = "Nothing was stopped: this is a replay, and no line is open."
+LIVE_STOPPED = "Stopping all drives of the live lines. The drives on this screen are a replay."
+NO_COMMAND_IN_REPLAY = "This is a replay: nothing is sent to a drive."
 UNREACHED = (
     "NOT STOPPED: device {}, not identified. Stop it at the machine, or enter its profile on Line"
     " and press s."
@@ -86,7 +94,8 @@ class KeyDispatcher(HarmlessKeys):
         """
         self._stops += 1
         for line in self.panel_lines:
-            line.fleet.last_stop(error)
+            if line.opened.replay is None:
+                line.fleet.last_stop(error)
 
     def sequence_swallowed(self, data: bytes) -> None:
         """Report an unknown key during the F12 test; in the thread that reads keys."""
@@ -123,6 +132,23 @@ class KeyDispatcher(HarmlessKeys):
     def stroke(self) -> Stroke | None:
         """The stroke of the key that is taking effect now; None if there is none."""
         return self._typed.stroke
+
+    async def run_action(
+        self,
+        action: str | ActionParseResult,
+        default_namespace: DOMNode | None = None,
+        namespaces: Mapping[str, DOMNode] | None = None,
+    ) -> bool:
+        """Carry out an action of a key or of the palette; refuse those that need a drive.
+
+        The drives of a replay are not there.
+        """
+        name = action.partition("(")[0] if isinstance(action, str) else action[1]
+        needs_line = name in LINE_ONLY_IN_REPLAY and self.place != CONNECTION
+        if self.replay is not None and (needs_line or name in NOT_IN_REPLAY):
+            self.notify(NO_COMMAND_IN_REPLAY, severity="warning")
+            return True
+        return await super().run_action(action, default_namespace, namespaces)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """Disable the stop by Space while a text is being typed."""
@@ -183,17 +209,19 @@ class KeyDispatcher(HarmlessKeys):
         """
         strangers = [
             device
-            for fleet in self.fleets
+            for fleet in self.live_fleets
             for device in fleet.strangers
             if device not in others.get(fleet, ())
         ]
         if not strangers:
-            if not any(others.values()) and not any(fleet.sessions for fleet in self.fleets):
-                self._warn(NOBODY_TO_STOP)
+            if not any(others.values()) and not any(fleet.sessions for fleet in self.live_fleets):
+                self._warn(NOBODY_IN_REPLAY if self.replay is not None else NOBODY_TO_STOP)
+            elif self.replay is not None:
+                self._warn(LIVE_STOPPED)
         else:
             text = UNREACHED.format(", ".join(map(str, strangers)))
             self.events.add("failed", text)
-            self.unreached = text, self.clock.monotonic()
+            self.unreached = text, self.panel_clock.monotonic()
 
     def _stop_sessions(
         self, fleet: Fleet, sessions: list[DriveSession], order: OrderId = "stop"
@@ -220,9 +248,12 @@ class KeyDispatcher(HarmlessKeys):
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
         """Stop one drive by this kind of stop."""
         self._stops += 1
-        for fleet in self.fleets:
+        for fleet in self.live_fleets:
             if console in fleet.consoles:
                 self._stop_sessions(fleet, [console.session], order)
+                return
+        if self.replay is not None:
+            self.notify(NO_COMMAND_IN_REPLAY, severity="warning")
 
     async def on_event(self, event: Event) -> None:
         """Handle a key in its turn; each key extends the arming of armed drives."""
@@ -235,7 +266,7 @@ class KeyDispatcher(HarmlessKeys):
                 return
             self.hurry()
             if isinstance(event, Key):
-                for fleet in self.fleets:
+                for fleet in self.live_fleets:
                     for session in fleet.sessions:
                         session.arming.touch()
         elif isinstance(event, Key) and self._is_void(event):
@@ -275,7 +306,7 @@ class KeyDispatcher(HarmlessKeys):
     def _open_drive(self) -> DriveConsole | None:
         """Return the target of the stop key: the open drive; None for every drive."""
         chosen = self.chosen
-        known = chosen is not None and any(chosen in fleet.consoles for fleet in self.fleets)
+        known = chosen is not None and any(chosen in fleet.consoles for fleet in self.live_fleets)
         return chosen if known else None
 
     @property
@@ -284,6 +315,8 @@ class KeyDispatcher(HarmlessKeys):
         chosen = self._open_drive()
         if self.hearing and not self.fleets:
             return STOPS_NONE
+        if self.replay is not None:
+            return STOPS_LIVE if self.live_fleets else NO_MOTOR
         return f"STOP {chosen.device}" if chosen is not None else STOPS_ALL
 
 
@@ -292,9 +325,9 @@ def _stop_others(fleet: Fleet, stopped: dict[Fleet, Collection[int]]) -> None:
 
 
 def every_fleet(panel: Panel) -> list[Fleet]:
-    """The drives of every open line, even after an internal error in finding the shown one."""
+    """The drives of every live line, even after an internal error in finding the shown one."""
     try:
-        return panel.fleets
+        return panel.live_fleets
     except Exception:
         log.exception("which line is shown is not known")
-        return [line.fleet for line in panel.panel_lines]
+        return [line.fleet for line in panel.panel_lines if line.opened.replay is None]

@@ -47,14 +47,14 @@ class Leaving(Panel):
         if any(isinstance(screen, Leave) for screen in self.screen_stack):
             return
         if running := self._motors():
-            reported = self._leaving_report(self.fleets, on_purpose=True)
-            states, offer = MotorStates(self, running), self._save_offer(self.fleets)
+            reported = self._leaving_report(self.live_fleets, on_purpose=True)
+            states, offer = MotorStates(self, running), self._save_offer(self.live_fleets)
             requested = Leave("\n".join(reported), states, offer)
             self.push_screen(requested, self._leave_motors)
             return
         if self._requested in self.screen_stack:
             return
-        self._requested = self._question(self.fleets, "Quit the panel?", yes="Quit", no="Stay")
+        self._requested = self._question(self.live_fleets, "Quit the panel?", yes="Quit", no="Stay")
         if self._requested is None:
             self.exit()
         else:
@@ -62,7 +62,9 @@ class Leaving(Panel):
 
     def _motors(self) -> list[DriveSession]:
         """Drives that this panel commands and whose motors are not known to be at standstill."""
-        return [session for fleet in self.fleets for session in fleet.line_watch.under_command()]
+        return [
+            session for fleet in self.live_fleets for session in fleet.line_watch.under_command()
+        ]
 
     def _leaving_report(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
         """Return what happens to the drives of these lines; with line names if there are several.
@@ -174,7 +176,8 @@ class Leaving(Panel):
         labels = {id(item.fleet): f"{item.opened.label}: " for item in self.panel_lines}
         several = len(labels) > 1
         lines = [
-            LineStops(fleet, labels.get(id(fleet), "") if several else "") for fleet in self.fleets
+            LineStops(fleet, labels.get(id(fleet), "") if several else "")
+            for fleet in self.live_fleets
         ]
         for line in lines:
             line.order()
@@ -190,7 +193,7 @@ class Leaving(Panel):
         With `always` it asks in any case, with that text. Call it in a worker: it waits for the
         answer.
         """
-        fleets = [self.fleet] if self.fleet is not None else []
+        fleets = [fleet for fleet in self.live_fleets if fleet is self.fleet]
         requested = self._question(fleets, question, yes=yes, no=no, always=always)
         if requested is None:
             return True

@@ -27,6 +27,8 @@ log = logging.getLogger(__name__)
 CHOSEN_CONNECTS_WITHIN = 4.0
 """Seconds within which a line chosen by a person must connect."""
 
+MONITORED_IN_LEAD = 4
+"""Drives whose curves begin before the time of a replay, if none is open."""
 WAY_TO_ACCEPT = "If this is the right line, press Ctrl+P and type accept."
 
 Opener = Callable[..., "OpenLine"]
@@ -68,30 +70,58 @@ class LineOwner(Panel):
         shown = self._shown()
         if shown is not None and not shown.fleet.found:
             await self._close(shown)  # it has no drives
-        opening = asyncio.ensure_future(asyncio.to_thread(self._open_here, text, remember))
+        opening = asyncio.ensure_future(asyncio.to_thread(self._open_here, text, remember=remember))
         try:
             opened = await asyncio.shield(opening)
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
+        line = await self._with_replayed(opened) if opened.replay else self._with_fleet(opened)
+        self.panel_lines = (*self.panel_lines, line)
+        self.show_line(line)
+        if opened.replay is not None:
+            opened.replay.clock.play()
+        else:
+            self._look_after(line.fleet)
+            line.fleet.event_notes.ask()
+        if unkept := opened.line.facts.unkept:
+            line.fleet.events.add("alarm", unkept)
+        log.info("opened %s", opened.label)
+        self.opening.connected = True
+
+    def _with_fleet(self, opened: OpenLine) -> PanelLine:
         from tui.session.fleet import Fleet
         from tui.session.starts.keeper import StartKeeper
 
         # no record for a simulated line: its motors end with it
-        starts = StartKeeper("panel", clock=self.clock) if opened.simulation is None else None
+        starts = StartKeeper("panel", clock=self.panel_clock) if opened.is_real else None
         if starts is not None:
             starts.left_running = self.leave_running
         events = LineEvents(self.events, opened.label, lambda: self.opened is opened)
-        fleet = Fleet(opened.line, self.journal, starts, events, self.clock)
-        line = PanelLine(opened, fleet)
-        self.panel_lines = (*self.panel_lines, line)
-        self.show_line(line)
-        self._look_after(fleet)
-        fleet.event_notes.ask()
-        if unkept := opened.line.facts.unkept:
-            events.add("alarm", unkept)
-        log.info("opened %s", opened.label)
-        self.opening.connected = True
+        return PanelLine(opened, Fleet(opened.line, self.journal, starts, events, self.panel_clock))
+
+    async def _with_replayed(self, opened: OpenLine, device: int | None = None) -> PanelLine:
+        """Return a replay with its drives at its time; messages in it are not those of the panel.
+
+        The curve of the drive `device` begins before that time.
+        """
+        from tui.session.events import EventLog
+        from tui.session.fleet import Fleet
+        from tui.session.replay import UnwrittenJournal, pass_lead, take_drives
+
+        replay = opened.replay
+        assert replay is not None
+        events = EventLog(replay.clock.wall)
+        fleet = Fleet(replay, UnwrittenJournal(), None, events, replay.clock)
+        for text in await asyncio.to_thread(take_drives, replay, fleet):
+            self.events.add("alarm", text)
+        monitored = [console for console in fleet.consoles if device in (None, console.device)]
+        for console in monitored[:MONITORED_IN_LEAD]:
+            console.monitor.start(period=self.period)
+        await pass_lead(replay, len(fleet.consoles))
+        for console in monitored:
+            console.monitor.stop()
+        return PanelLine(opened, fleet)
 
     def open_line_of(self, text: str) -> PanelLine | None:
         """The open line that a text names, whatever its settings; None if it is not open."""
@@ -128,15 +158,19 @@ class LineOwner(Panel):
         fleet.line.facts.events.subscribe(hear)
         fleet.handover.person = True
         OrphanMotorGuard(
-            fleet.line, self.journal, session_of=session_of, events=fleet.events, clock=self.clock
+            fleet.line,
+            self.journal,
+            session_of=session_of,
+            events=fleet.events,
+            clock=self.panel_clock,
         )
 
-    def _open_here(self, text: str, remember: bool) -> OpenLine:
+    def _open_here(self, text: str, *, remember: bool) -> OpenLine:
         """Open a line in a thread; close it again if the panel has ended in the meantime."""
         opened = self._open(
             text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN, program="panel"
         )
-        if opened.simulation is None:
+        if opened.is_real:
             from tui.session.connect.known_line import KnownLine
 
             opened.known = KnownLine(opened.line, way=WAY_TO_ACCEPT)
@@ -149,7 +183,7 @@ class LineOwner(Panel):
         if self._gone:
             opened.close()
             raise LineClosed
-        if remember:
+        if remember and opened.replay is None:
             _remember(opened.text)
         return opened
 

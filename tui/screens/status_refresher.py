@@ -44,12 +44,16 @@ class StatusRefresher(Panel):
         """Update the frame, ring for a new fault, and report new troubles."""
         if not self.is_running:
             return  # the panel ends: its screens are removed before its timers
-        watches = [(fleet.alarms, fleet.line_watch) for fleet in self.fleets]
-        new = [alarms.take(watch.states, watch.onsets.by_device) for alarms, watch in watches]
+        live = self.live_fleets
+        new = [
+            fleet.alarms.take(fleet.line_watch.states, fleet.line_watch.onsets.by_device)
+            and fleet in live
+            for fleet in self.fleets
+        ]
         if any(new) and self.bell_rings:
             self.bell()
         self._say_left_behind()
-        if (now := self.clock.monotonic()) >= self._judged_at + HEALTH_LOOK:
+        if (now := self.panel_clock.monotonic()) >= self._judged_at + HEALTH_LOOK:
             self._judged_at = now
             self._judge_lines()
         trouble = self.journal_trouble
@@ -70,7 +74,7 @@ class StatusRefresher(Panel):
         if keys_shown_now != self._keys_shown:
             self._keys_shown = keys_shown_now
             self.screen.draw_stop_keys()
-        view, now = self._frame.view(), self.clock.monotonic()
+        view, now = self._frame.view(), self.panel_clock.monotonic()
         drawn = (self.screen, self.screen.size, view.at_once)
         if drawn != self._drawn:
             self.hurry()
@@ -82,7 +86,7 @@ class StatusRefresher(Panel):
     def _judge_lines(self) -> None:
         """Report once each trouble in the last minute of a line, and its end."""
         labels = {id(item.fleet): item.opened.label for item in self.panel_lines}
-        for fleet in self.fleets:
+        for fleet in self.live_fleets:
             # not shared with other programs: each of them reports it itself
             label = "" if fleet is self.fleet else f"{labels[id(fleet)]}: "
             health, line = fleet.health, fleet.line

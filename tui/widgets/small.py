@@ -18,6 +18,7 @@ from .palette import (
     STRONG,
     age_text,
 )
+from .replay_bar import NO_MOTOR, replay_line
 from .strip import STRIP_STYLES, DriveNow, StripView
 
 LEAST_WIDTH, LEAST_HEIGHT = 60, 16
@@ -40,9 +41,9 @@ def small_lines(view: StripView, target: str, width: int, height: int) -> list[T
     `target` is the label of the stop key.
     """
     drive = view.drive
-    lines = (
-        _drive_lines(drive, width) if drive is not None else [Text(" No drive is open.", STRONG)]
-    )
+    lines = [replay_line(view.replay, width)] if view.replay is not None else []
+    no_drive = [Text(" No drive is open.", STRONG)]
+    lines += _drive_lines(drive, width) if drive is not None else no_drive
     if view.faults:
         lines.append(Text(f" {view.faults} in fault on this line", FAULT))
     apart = [Text()] if height >= ROWS_FOR_GAPS else []
@@ -81,6 +82,8 @@ def _drive_lines(drive: DriveNow, width: int) -> list[Text]:
 def _keys(target: str, width: int) -> list[Text]:
     """The stop keys, on as many lines as they need."""
     lines = [Text()]
+    if target == NO_MOTOR:
+        return [Text(f" {target}", FAINT)]
     for key, label in STOPS:
         part = Text(f" {key} {label or target} ", STOP_KEY)
         if lines[-1].cell_len + part.cell_len > width:

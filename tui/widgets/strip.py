@@ -33,6 +33,7 @@ from .palette import (
     STRONG,
     age_text,
 )
+from .replay_bar import ReplayView
 
 STATE_WIDTH = 14
 VALUES_WIDTH = 26
@@ -98,6 +99,8 @@ class StripView(NamedTuple):
     """True if the journal cannot be written."""
     trouble: tuple[str, ...] = ()
     """Texts for line trouble, the longest first; empty while the line is healthy."""
+    replay: ReplayView | None = None
+    """The replay that is shown; None if the drives are live."""
 
 
 def strip_line(view: StripView, width: int) -> Text:
@@ -339,4 +342,6 @@ class FrameView(NamedTuple):
         # a message may count seconds: its figures do not make it new
         text = message and re.sub(r"\d+", "", message.text)
         faults = strip.faults, strip.unseen, bool(strip.trouble)
-        return who, armed, faults, strip.off_record, self.place, self.marks, text, self.not_stopped
+        replay = strip.replay and (strip.replay.playing, strip.replay.speed)
+        shown = strip.off_record, self.place, self.marks, replay
+        return who, armed, faults, *shown, text, self.not_stopped

@@ -174,6 +174,8 @@ class LineKeys(Scanning):
         try:
             if not await self._opens(text):
                 return
+            if device is None and self.app.replay is not None and len(self.found) == 1:
+                device = next(iter(self.found))
             if device is None:
                 self.action_scan()
                 return

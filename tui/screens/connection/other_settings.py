@@ -72,7 +72,7 @@ class OtherSettings(LineKeys):
         link = opened.line.link if opened is not None else None
         if opened is None:
             self.say("No line is open.", "Choose one and press Enter.", ALARM_KIND)
-        elif not isinstance(link, SerialLink) or opened.simulation is not None:
+        elif not isinstance(link, SerialLink) or not opened.is_real:
             self.say(
                 "This line has no baud or format of its own.", "Press s to scan it.", ALARM_KIND
             )

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 NONE_AT_ADDRESS = "No drive answered at address {} (2 attempts)."
 NONE_AT_ADDRESSES = "No drive answered at addresses {} (2 attempts)."
+NO_SCAN_IN_REPLAY = "This is a replay: it has the drives of its record."
 AFTER_NO_ANSWER = (
     "Press N to diagnose, c to change the addresses, or s to scan again. Ctrl+P lists a scan at"
     " other baud rates."
@@ -67,6 +68,12 @@ class Scanning(LineView):
 
         fleet = self.app.fleet
         if fleet is None:
+            return
+        if self.app.replay is not None:
+            if len(devices) > 1:
+                self.say(NO_SCAN_IN_REPLAY, "Press Enter on a drive to see it.")
+            self.look()
+            self._lead_to_drives()
             return
         opened = self.app.opened
         patient = opened is not None and opened.simulation is not None
@@ -122,7 +129,7 @@ class Scanning(LineView):
         Shows none for known drives or for drives simulated in this process.
         """
         opened = self.app.opened
-        if not wanted or opened is None or opened.simulation is not None:
+        if not wanted or opened is None or not opened.is_real:
             self.families = ""
             return
         self.families = await asyncio.to_thread(_families)
@@ -137,7 +144,7 @@ class Scanning(LineView):
         from tui.session.connect import other_masters
 
         opened = self.app.opened
-        if opened is None or opened.simulation is not None or not other_masters.LISTEN:
+        if opened is None or not opened.is_real or not other_masters.LISTEN:
             return False
         if not isinstance(link, SerialLink) or opened.line.facts.others:
             return False  # nothing to hear, or only other programs of Drive Panel

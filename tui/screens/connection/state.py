@@ -265,11 +265,11 @@ class LineView(PanelScreen):
 
     def on_key(self, event: Key) -> None:
         """Note the time of the key press: the list is not sorted while keys arrive."""
-        self._typed_at = self.app.clock.monotonic()
+        self._typed_at = self.app.panel_clock.monotonic()
         super().on_key(event)
 
     def _is_user_idle(self) -> bool:
-        return self.app.clock.monotonic() - self._typed_at >= QUIET
+        return self.app.panel_clock.monotonic() - self._typed_at >= QUIET
 
     # The titles
 

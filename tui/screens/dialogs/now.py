@@ -36,11 +36,11 @@ class MotorStates:
         # imported here, as the app's first picture does not need it
         from tui.widgets.motor_state_text import motor_state_text
 
-        fleet = self._app.fleet
-        looks = fleet.line_watch.looks if fleet else {}
-        now = self._app.clock.monotonic()
         text = Text()
         for session in self._sessions[:DRIVES_NAMED]:
+            # a line that is not shown may have a drive of this address, too
+            fleet = next((item for item in self._app.fleets if session in item.sessions), None)
+            looks, now = fleet.line_watch.looks if fleet else {}, session.clock.monotonic()
             console = fleet.console(session.device) if fleet else None
             which = f"Now {session.device:<3} " if len(self._sessions) > 1 else "Now  "
             text.append(which if not text else f"\n{which}", FAINT)

@@ -167,13 +167,13 @@ class Question(Framed, ModalScreen[T]):
 
     def on_key(self, event: Key) -> None:
         """Note when the last key arrived."""
-        self._typed_at = self.app.clock.monotonic()
+        self._typed_at = self.app.panel_clock.monotonic()
 
     def action_swallow(self, as_no: bool = False) -> None:
         """Ignore a key that came too early, and report why.
 
         A no is ignored only if the question opened without a key."""
-        self._typed_at = self.app.clock.monotonic()
+        self._typed_at = self.app.panel_clock.monotonic()
         self.app.tell(TYPED_ON if self.by_itself else TOO_EARLY)
 
     def action_no(self) -> None:
@@ -181,12 +181,12 @@ class Question(Framed, ModalScreen[T]):
         self.answer(self.NO)
 
     def _note_drawn(self) -> None:
-        self._drawn = self.app.clock.monotonic()
+        self._drawn = self.app.panel_clock.monotonic()
 
     def _is_early(self) -> bool:
         if self._drawn is None:
             return True
-        now = self.app.clock.monotonic()
+        now = self.app.panel_clock.monotonic()
         if self.by_itself:
             return now - max(self._drawn, self._typed_at) < ANSWER_COUNTS_AFTER
         return now - self._drawn < self.SETTLED

@@ -43,7 +43,7 @@ def ask_where(app: Panel, kept: KeptFrames) -> None:
     if not kept.frames:
         app.tell("Nothing to save: no frame is shown.")
         return
-    name = time.strftime("frames-%Y%m%d-%H%M%S.pcapng", time.localtime(app.clock.wall()))
+    name = time.strftime("frames-%Y%m%d-%H%M%S.pcapng", time.localtime(app.panel_clock.wall()))
 
     def reported(answer: str | None) -> None:
         if answer:

@@ -32,6 +32,7 @@ KEY_NAMES = {
     "shift+tab": "Shift+Tab",
     "pageup": "PgUp",
     "pagedown": "PgDn",
+    "comma": ",",
 }
 """Keys whose names on screens differ from Textual's, apart from capitals."""
 
@@ -48,6 +49,11 @@ SHOWING = frozenset(
             "cursor",
             "move_cursor",
             "turn_format",
+            "replay_hold",
+            "replay_speed",
+            "replay_step",
+            "replay_event",
+            "replay_time",
         ),
     }
 )
@@ -55,6 +61,27 @@ SHOWING = frozenset(
 
 `step_drive` and `type_address` are not among them: they change which motor the stop key stops.
 """
+
+NOT_IN_REPLAY = frozenset(
+    {
+        *(
+            "arm",
+            "answer_request",
+            "run_line",
+            "step_reference",
+            "reference_by",
+            "reset",
+            "options",
+        ),
+        *("take_control", "hand_back", "take_over", "inputs", "stop_as", "ask_stop_as", "prove"),
+        *("edit", "step_value", "factory", "confirm", "stage_set", "write", "write_one", "eeprom"),
+        *("pick", "shift", "clear", "best", "exchange", "choose_word", "clear_word", "teach"),
+        *("write_chosen", "reset_drive_counters", "verify"),
+    }
+)
+"""Actions that command a drive, write to it, or prepare that: a replay refuses them."""
+LINE_ONLY_IN_REPLAY = frozenset({"why", "hear", "bundle", "scan"})
+"""Actions that send requests or open ports: in a replay, only for the line chosen on Line."""
 
 
 class Action(NamedTuple):

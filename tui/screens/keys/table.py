@@ -12,6 +12,7 @@ from textual.binding import Binding, BindingType
 
 from tui.terminal.names import UNSHIFTED_DIGITS
 from tui.widgets.drawing import KeyLabel, fitting
+from tui.widgets.replay_bar import NO_MOTOR
 
 from .action import Action
 from .screens import EVERYWHERE, SCREENS, TABBED
@@ -31,8 +32,21 @@ WHILE_TYPING: tuple[KeyLabel, ...] = (
     ("quit", "^q", "quit"),
 )
 """Keys of the panel that work while text is typed."""
+IN_REPLAY: tuple[KeyLabel, ...] = (
+    ("replay_hold", "0", "hold"),
+    ("replay_step", ", ;", "5 s"),
+    ("replay_speed", "{ }", "speed"),
+    ("replay_event", "$ #", "event"),
+    ("replay_time", "@", "time"),
+    ("leave", "Esc", "back"),
+    ("quit", "q", "quit"),
+    ("help", "?", "help"),
+)
+"""Keys of every screen of a replay, after the stop key."""
 STOPS_ALL, STOPS_NONE = "STOP ALL", "cannot stop here"
 """Labels of the stop key if it stops every drive, or none."""
+STOPS_LIVE = "STOP LIVE ALL"
+"""The same in a replay with live lines beside it; without any it is `NO_MOTOR`."""
 SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
 OPEN = "Open a file: compare a parameter set, or stage an assignment."
 REPORT_DRIVE = "Report on the open drive: read everything and write a file (Markdown)."
@@ -71,6 +85,14 @@ APP_ACTIONS: tuple[Action, ...] = (
     app_action("wiring", "I", "", WIRING_HELP),
     app_action("why", "N", "", WHY),
     app_action("hear", "H", "", HEAR),
+    app_action("replay_hold", "0", "", "In a replay: hold it, or let it go on."),
+    app_action("replay_step(-5)", "comma", "", "In a replay: go back by 5 s."),
+    app_action("replay_step(5)", ";", "", "In a replay: go forward by 5 s."),
+    app_action("replay_speed(-1)", "{", "", "In a replay: play slower."),
+    app_action("replay_speed(1)", "}", "", "In a replay: play faster."),
+    app_action("replay_event(1)", "#", "", "In a replay: go to the next event."),
+    app_action("replay_event(-1)", "$", "", "In a replay: go to the event before."),
+    app_action("replay_time", "@", "", "In a replay: type a time to go to."),
     app_action("save_shown", "ctrl+s", "", SAVE),
     app_action("open_file", "ctrl+o", "", OPEN),
     app_action("report", "ctrl+r", "", REPORT_DRIVE),
@@ -142,6 +164,8 @@ def keys_line(screen: str, width: int, stops: str = "STOP") -> list[KeyLabel]:
     `stops` is the label of the stop key.
     """
     first = stop_keys(stops, typing=False)[0]
+    if stops in (STOPS_LIVE, NO_MOTOR):
+        return fitting([first, *IN_REPLAY], width, NEVER_DROPPED)
     keys = [
         (action.id, action.shown, action.label) for action in screen_actions(screen) if action.label
     ]
@@ -171,8 +195,14 @@ def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
 
     While a text is being typed (`typing`), Space is text and the key is F12.
     """
+    if stops == NO_MOTOR:
+        return [("stop_by_space", "", NO_MOTOR)]
     keys = [("stop_by_space", "F12" if typing else "Space", stops)]
-    return keys if stops in (STOPS_ALL, STOPS_NONE) else [*keys, ("stop_all", "F9", STOPS_ALL)]
+    return (
+        keys
+        if stops in (STOPS_ALL, STOPS_NONE, STOPS_LIVE)
+        else [*keys, ("stop_all", "F9", STOPS_ALL)]
+    )
 
 
 CAPS_LOCK = "Is Caps Lock on? {key} means: {help}"

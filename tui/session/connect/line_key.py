@@ -15,6 +15,7 @@ from pathlib import Path
 from tui.bus.errors import LinkSyntaxError
 
 SIMULATED_PREFIX = "sim:"
+REPLAY_PREFIX = "replay:"
 _LABEL_SETTINGS = re.compile(r"\s\d+(\s8[NEO][12](\stimeout=\S+)?)?$", re.IGNORECASE)
 """Settings behind a path as a screen shows them: `/dev/ttyUSB0 19200 8E1`."""
 _WINDOWS_PORT = re.compile(r"(?:\\\\\.\\)?(COM\d+)", re.IGNORECASE)
@@ -32,6 +33,8 @@ def line_key(text: str) -> str:
     text = text.strip()
     if text.casefold().startswith(SIMULATED_PREFIX):
         return _simulated(text)
+    if is_replay(text):
+        return REPLAY_PREFIX + os.path.abspath(text[len(REPLAY_PREFIX) :].partition(",at=")[0])
     try:
         link = parse_link(text)
     except LinkSyntaxError:
@@ -45,6 +48,11 @@ def line_key(text: str) -> str:
             return f"tcp:{host_key(host)}:{port}{only}"
         case RtuTcpLink(host=host, port=port):
             return f"rtu-tcp:{host_key(host)}:{port}"
+
+
+def is_replay(text: str) -> bool:
+    """True if a LINE is the replay of a record."""
+    return text.casefold().startswith(REPLAY_PREFIX)
 
 
 def _port(path: str) -> str:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Protocol
 
 from tui.bus.errors import LinkSyntaxError
 
-from .line_key import SIMULATED_PREFIX, line_key
+from .line_key import REPLAY_PREFIX, SIMULATED_PREFIX, is_replay, line_key
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from tui.simulator import DriveSpec, Simulation
 
     from ..record.recorder import LineRecorder
+    from ..record.replay_line import ReplayLine
     from .known_line import KnownLine
 
 
@@ -56,10 +57,19 @@ class OpenLine:
     """Records what this process itself sends on the line; None if it does not."""
     private: TemporaryDirectory[str] | None = None
     """Folder of the record of a simulated line."""
+    replay: ReplayLine | None = None
+    """The line, if it is the replay of a record; no drive is on it."""
+
+    @property
+    def is_real(self) -> bool:
+        """True if the drives on it are neither simulated nor replayed."""
+        return self.simulation is None and self.replay is None
 
     @property
     def label(self) -> str:
         """Name of the line on a screen."""
+        if self.replay is not None:
+            return f"{REPLAY_PREFIX}{self.replay.path.name}"
         if self.simulation is None:
             from tui.bus.link import label
 
@@ -114,6 +124,8 @@ def open_line(
         return _simulated(
             parse_drives(text[len(SIMULATED_PREFIX) :]), read_only=read_only, wait=wait
         )
+    if is_replay(text):
+        return _replayed(text, wait)
     from tui.bus.line import Line
     from tui.bus.link import absolute, parse_link
     from tui.bus.share.keeping import can_start
@@ -165,6 +177,10 @@ def check_line(text: str) -> None:
             parse_drives(text[len(SIMULATED_PREFIX) :])
         except SimulatorError as error:
             raise LinkSyntaxError(str(error)) from error
+    elif is_replay(text):
+        from ..record.replay_text import open_replay, parse_replay
+
+        open_replay(parse_replay(text[len(REPLAY_PREFIX) :])).close()
     else:
         from tui.bus.link import parse_link
 
@@ -211,6 +227,13 @@ def _simulated(
 
     opened = OpenLine(text, line, simulation, tuple(profiles), profiles, again=again)
     return _opened(opened, wait)
+
+
+def _replayed(text: str, wait: float | None) -> OpenLine:
+    from ..record.replay_text import REPLAY_LEAD, open_replay, parse_replay
+
+    line = open_replay(parse_replay(text[len(REPLAY_PREFIX) :]), lead=REPLAY_LEAD)
+    return _opened(OpenLine(text, line, devices=line.devices, replay=line), wait)
 
 
 def _opened(opened: OpenLine, wait: float | None) -> OpenLine:

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tui.bus.api import ModbusLine, Priority, Reply
-from tui.bus.errors import DeviceException, NoAnswer
+from tui.bus.errors import DeviceException, NoAnswer, NotRecorded
 from tui.bus.poll_plan import PlannedRead, PolledTurn
 from tui.drive.chart import read_chart
 from tui.drive.profile.profile import Profile, is_verified
@@ -363,4 +363,6 @@ class Reader:
     def _refusal(self, parameter: Parameter, refusal: DeviceException) -> Reading:
         absent = refusal.code == self.profile.data.reading.unknown_exception
         now = self.session.clock.monotonic()
+        if isinstance(refusal, NotRecorded):
+            now -= ASK_AGAIN  # a replay may come to its first value at any time
         return Reading.bad(parameter, now, str(refusal), absent=absent)

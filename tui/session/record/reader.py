@@ -22,6 +22,9 @@ from .schema import (
 ROWS_AT_A_TIME = 1000
 """Rows of one query: a longer one would keep the writer from emptying the file's log."""
 
+OTHER = "it is not a record of version {1}"
+NEWER = "it has version {0}, and this Drive Panel reads version {1}: install a newer one"
+
 
 class RecordedWord(NamedTuple):
     """One register of one reply; times in microseconds, see the schema."""
@@ -82,13 +85,19 @@ class ReducedWord(NamedTuple):
 class RecordReader:
     """One file, opened read-only. Its methods raise sqlite3.Error."""
 
-    def __init__(self, path: Path) -> None:
-        """Open a record. Raises RecordDamaged if it is not one of this version, sqlite3.Error."""
-        self._base = sqlite3.connect(f"file:{quote(str(path))}?mode=ro", uri=True)
+    def __init__(self, path: Path, *, any_thread: bool = False) -> None:
+        """Open a record. Raises RecordDamaged if it is not one of this version, sqlite3.Error.
+
+        With `any_thread`, the caller lets one thread use it at a time.
+        """
+        self._base = sqlite3.connect(
+            f"file:{quote(str(path))}?mode=ro", uri=True, check_same_thread=not any_thread
+        )
         number = [self._base.execute(f"PRAGMA {name}").fetchone()[0] for name in _MARKS]
         if number != list(_MARKS.values()):
             self._base.close()
-            raise RecordDamaged(f"it is not a record of version {RECORD_VERSION}", path)
+            text = NEWER if number[0] == RECORD_ID and number[1] > RECORD_VERSION else OTHER
+            raise RecordDamaged(text.format(number[1], RECORD_VERSION), path)
 
     def close(self) -> None:
         """Close the file."""

@@ -1,0 +1,303 @@
+"""A replay answers as the record says: never more than was read by then, and takes no write."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+
+import pytest
+
+from tui.bus.errors import (
+    ChecksumFault,
+    DeviceException,
+    LineLost,
+    LinkSyntaxError,
+    NoAnswer,
+    NotRecorded,
+    RequestRefused,
+)
+from tui.bus.link import SerialLink
+from tui.session.record.record_file import RecordFile
+from tui.session.record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
+from tui.session.record.replay_text import open_replay, parse_replay, time_in
+from tui.session.record.schema import EventRow, ReplyRow
+
+BEGIN = 1_795_000_000
+LINE = "serial:/dev/ttyUSB0,9600,8N1"
+
+
+def row(
+    at: float, words: tuple[int, ...] = (), *, address: int = 100, registers: int = 0,
+    quality: int = 0, received: bytes | None = None, repeat: int = 0, device: int = 1,
+) -> ReplyRow:  # fmt: skip
+    """A read that ends 10 ms after its request; `at` is its end in seconds after the begin."""
+    end = round((BEGIN + at) * 1e6)
+    data = b"".join(word.to_bytes(2, "big") for word in words) or None
+    return ReplyRow(
+        end - 10_000, end - 10_000, 10_000, device, 3, address, registers or len(words), quality,
+        data, None, received, repeat, "",
+    )  # fmt: skip
+
+
+def event(at: float, kind: str, text: str, device: int | None = None) -> EventRow:
+    when = round((BEGIN + at) * 1e6)
+    return EventRow(when, when, device, kind, text)
+
+
+def record(folder: Path, *rows: ReplyRow, events: tuple[EventRow, ...] = ()) -> Path:
+    """A closed record with these rows."""
+    path = folder / "run.sqlite"
+    file = RecordFile(path, LINE, "test")
+    file.write(rows, events)
+    file.close()
+    return path
+
+
+@contextmanager
+def replayed(path: Path, at: float) -> Iterator[ReplayLine]:
+    line = ReplayLine(path, BEGIN + at)
+    line.open()
+    with closing(line):
+        yield line
+
+
+def words(line: ReplayLine, address: int = 100, count: int = 1) -> tuple[int, ...]:
+    return asyncio.run(line.read(1, address, count)).words
+
+
+def test_read_returns_the_newest_reply_by_then_with_its_time(tmp_path: Path) -> None:
+    path = record(tmp_path, row(1, (10, 20)), row(2, (11, 21)), row(3, (12, 22)))
+    with replayed(path, 2.5) as line:
+        reply = asyncio.run(line.read(1, 100, 2))
+        assert reply.words == (11, 21)
+        assert reply.time == pytest.approx(BEGIN + 2)
+        assert words(line, 101) == (21,)
+
+
+def test_register_that_was_not_read_by_then_has_no_value(tmp_path: Path) -> None:
+    path = record(tmp_path, row(1, (10,)), row(5, (77,), address=200))
+    with replayed(path, 4.0) as line:
+        assert words(line) == (10,)
+        with pytest.raises(NotRecorded, match="Not read by then"):
+            words(line, 200)
+        with pytest.raises(NotRecorded):
+            words(line, 100, 2)
+
+
+def test_reply_that_had_not_ended_is_not_known_yet(tmp_path: Path) -> None:
+    path = record(tmp_path, row(1, (10,)), row(2, (11,)))
+    with replayed(path, 1.995) as line:
+        assert words(line) == (10,)
+
+
+def test_words_of_two_reads_are_never_mixed_in_one_reply(tmp_path: Path) -> None:
+    path = record(tmp_path, row(1, (10, 20)), row(2, (21,), address=101), row(9, (0,)))
+    with replayed(path, 3.0) as line:
+        with pytest.raises(NotRecorded):
+            words(line, 100, 2)
+        assert (words(line, 100), words(line, 101)) == ((10,), (21,))
+
+
+@pytest.mark.parametrize(
+    ("quality", "received", "error"),
+    [(2, None, NoAnswer), (3, b"\x01\x03", ChecksumFault), (1, b"\x83\x02", DeviceException)],
+)
+def test_failed_read_fails_again_until_the_next_good_one(
+    tmp_path: Path, quality: int, received: bytes | None, error: type[Exception]
+) -> None:
+    bad = row(2, registers=1, quality=quality, received=received)
+    path = record(tmp_path, row(1, (10,)), bad, row(3, (12,)))
+    with replayed(path, 2.5) as line:
+        with pytest.raises(error) as raised:
+            words(line)
+        assert not isinstance(raised.value, NotRecorded)
+        if isinstance(raised.value, DeviceException):
+            assert raised.value.code == 2
+        asyncio.run(line.run_to(BEGIN + 3.5))
+        assert words(line) == (12,)
+
+
+def test_refused_long_read_leaves_its_registers_readable(tmp_path: Path) -> None:
+    refused = row(2, registers=2, quality=1, received=b"\x83\x02")
+    path = record(tmp_path, row(1, (10,)), refused, row(9, (0,)))
+    with replayed(path, 2.5) as line:
+        with pytest.raises(DeviceException):
+            words(line, 100, 2)
+        assert words(line) == (10,)
+
+
+def test_failed_try_that_was_repeated_at_once_is_no_failure(tmp_path: Path) -> None:
+    lost = row(2, registers=1, quality=2)
+    path = record(tmp_path, row(1, (10,)), lost, row(2.2, (12,), repeat=1), row(9, (0,)))
+    with replayed(path, 1.0) as line:
+        asyncio.run(line.run_to(BEGIN + 2.1))
+        assert words(line) == (10,)
+
+
+def test_line_that_was_lost_is_lost_again(tmp_path: Path) -> None:
+    events = event(2, "line", "lost The adapter was unplugged."), event(4, "line", "connected")
+    path = record(tmp_path, row(1, (10,)), row(5, (12,)), events=events)
+    with replayed(path, 3.0) as line:
+        with pytest.raises(LineLost, match="unplugged"):
+            words(line)
+        asyncio.run(line.run_to(BEGIN + 4.5))
+        assert words(line) == (10,)
+
+
+def reduced_record(folder: Path) -> Path:
+    """Ten seconds in which one register changed and one did not; their replies are removed."""
+    rows = [row(index, (100 + index, 7)) for index in range(10)]
+    path = record(folder, *rows, row(11, (1,), address=300))
+    with closing(sqlite3.connect(path)) as base:
+        assert base.execute("SELECT count(*) FROM reduced").fetchone()[0] >= 1
+        base.execute("DELETE FROM reply WHERE address = 100")
+        base.commit()
+    return path
+
+
+def test_reduced_reply_has_a_mean_for_quantities_only(tmp_path: Path) -> None:
+    with replayed(reduced_record(tmp_path), 10.5) as line:
+        assert words(line, 101) == (7,)
+        with pytest.raises(NotRecorded):
+            words(line, 100)
+        line.use_means(1, {(3, 100): False}.get)
+        assert words(line, 100)[0] in range(100, 110)
+
+
+def test_reduced_reply_does_not_replace_the_replies_it_is_made_of(tmp_path: Path) -> None:
+    rows = [row(index, (100 + index,)) for index in range(10)]
+    with replayed(record(tmp_path, *rows), 9.5) as line:
+        line.use_means(1, {(3, 100): False}.get)
+        assert words(line) == (109,)
+        assert line.device_state(1).heard == pytest.approx(BEGIN + 9)
+
+
+def test_replay_sends_nothing_and_reaches_no_port(tmp_path: Path) -> None:
+    path = record(tmp_path, row(1, (10,)))
+    with replayed(path, 1.0) as line:
+        assert line.read_only
+        assert line.held == REPLAY_SENDS_NOTHING
+        for request in (
+            lambda: line.write(1, 8501, [15]),
+            lambda: line.read_write(1, 100, 1, 8501, [15]),
+            lambda: line.broadcast(8501, [0]),
+            lambda: line.diagnose(1, 0),
+        ):
+            with pytest.raises(RequestRefused, match="nothing is sent"):
+                asyncio.run(request())
+        assert line.link == SerialLink("replay", 9600, "8N1")
+        refused: list[str] = []
+        line.send_prepared((), refused.append)
+        assert refused == [REPLAY_SENDS_NOTHING]
+
+
+def test_time_stands_while_held_and_follows_the_speed(tmp_path: Path) -> None:
+    path = record(tmp_path, row(0, (10,)), row(1000, (11,)))
+    with replayed(path, 10.0) as line:
+        clock = line.clock
+        woken: list[float] = []
+
+        async def sleep() -> None:
+            while True:
+                await clock.sleep(10.0)
+                woken.append(clock.monotonic())
+
+        line.spawn(sleep, "sleeper")
+        time.sleep(0.1)
+        assert clock.monotonic() == BEGIN + 10
+        clock.set_speed(100.0)
+        clock.play()
+        end = time.monotonic() + 20
+        while len(woken) < 3 and time.monotonic() < end:
+            time.sleep(0.01)
+        clock.hold()
+        assert woken[:3] == pytest.approx([BEGIN + 20, BEGIN + 30, BEGIN + 40])
+        time.sleep(0.05)
+        before = clock.monotonic()
+        time.sleep(0.1)
+        assert clock.monotonic() == before
+
+
+def test_profile_note_is_the_last_one_by_then(tmp_path: Path) -> None:
+    notes = tuple(
+        event(at, "profile", json.dumps({"profile": name}), 1)
+        for at, name in ((2, "atv71"), (6, "atv312"))
+    )
+    path = record(tmp_path, row(0, (1,)), row(9, (2,)), events=notes)
+    for at, name in ((1, "atv71"), (5, "atv71"), (7, "atv312")):
+        with replayed(path, at) as line:
+            note = line.profile_note(1)
+            assert note is not None
+            assert name in note.text
+
+
+# Errors
+
+LOCAL = time.localtime(BEGIN)
+
+
+def test_time_without_a_date_is_that_of_the_record() -> None:
+    end = BEGIN + 7200
+    hour = time.strftime("%H:%M:%S", time.localtime(BEGIN + 3600))
+    assert time_in(hour, BEGIN, end) == BEGIN + 3600
+    assert time_in(time.strftime("%H:%M", LOCAL), BEGIN + 5, end) == BEGIN + 5
+    iso = time.strftime("%Y-%m-%dT%H:%M:%S", time.localtime(BEGIN + 60))
+    assert time_in(iso, BEGIN, end) == BEGIN + 60
+
+
+@pytest.mark.parametrize(
+    ("text", "words"), [("noon", "is not a time"), ("2020-01-01T00:00", "outside the record")]
+)
+def test_wrong_time_is_refused_with_the_form(text: str, words: str) -> None:
+    with pytest.raises(LinkSyntaxError, match=words):
+        time_in(text, BEGIN, BEGIN + 7200)
+
+
+def test_file_that_is_no_record_is_refused(tmp_path: Path) -> None:
+    for name, content in (("text.sqlite", b"no database" * 100), ("empty.sqlite", b"")):
+        (tmp_path / name).write_bytes(content)
+        with pytest.raises(LinkSyntaxError, match="cannot be replayed"):
+            open_replay(parse_replay(str(tmp_path / name)))
+    with pytest.raises(LinkSyntaxError, match="is not a file"):
+        open_replay(parse_replay(str(tmp_path / "missing.sqlite")))
+
+
+def test_record_of_a_newer_version_is_refused_by_its_version(tmp_path: Path) -> None:
+    path = record(tmp_path, row(1, (10,)))
+    with closing(sqlite3.connect(path)) as base:
+        base.execute("PRAGMA user_version = 7")
+        base.commit()
+    with pytest.raises(LinkSyntaxError, match=r"version 7.*install a newer"):
+        open_replay(parse_replay(str(path)))
+
+
+def test_record_without_a_reply_is_refused(tmp_path: Path) -> None:
+    path = record(tmp_path, events=(event(1, "program", "It has come."),))
+    with pytest.raises(LinkSyntaxError, match="no reply of a drive"):
+        open_replay(parse_replay(str(path)))
+
+
+def test_damaged_record_is_refused_or_fails_as_a_line_does(tmp_path: Path) -> None:
+    path = record(tmp_path, *(row(index, (index,) * 50) for index in range(500)))
+    data = bytearray(path.read_bytes())
+    data[4096 * 3 :] = bytes(len(data) - 4096 * 3)
+    path.write_bytes(bytes(data))
+    with pytest.raises(LinkSyntaxError, match="cannot be replayed"):
+        open_replay(parse_replay(str(path)))
+
+
+def test_record_that_is_being_written_shows_its_new_replies(tmp_path: Path) -> None:
+    path = tmp_path / "run.sqlite"
+    file = RecordFile(path, LINE, "test")
+    file.write([row(1, (10,)), row(2, (11,))], ())
+    with closing(file), replayed(path, 2.0) as line:
+        assert words(line) == (11,)
+        file.write([row(3, (12,))], ())
+        line.clock.end = BEGIN + 10
+        asyncio.run(line.run_to(BEGIN + 5))
+        assert words(line) == (12,)

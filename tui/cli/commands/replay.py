@@ -1,0 +1,64 @@
+"""`drivepanel replay`: the screens of the panel on a record."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from ..shared.errors import USAGE, Failure
+from ..shared.options import SLAVE_ADDRESS, one_device
+from ..shared.registration import command
+from .panel import ascii_option, bell_option, low_bandwidth_option, mouse_option, run_panel
+
+
+@command("Show a record on the screens of the panel.")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--at", "at", metavar="TIME", help="Begin at HH:MM[:SS], or at a date with a time.")
+@click.option(
+    "-d",
+    "--device",
+    type=SLAVE_ADDRESS,
+    multiple=True,
+    callback=one_device,
+    metavar="ADDRESS",
+    help="Show the drive at this address.",
+)
+@low_bandwidth_option
+@mouse_option
+@bell_option
+@ascii_option
+def replay(
+    file: Path,
+    at: str | None,
+    device: int | None,
+    low_bandwidth: bool,
+    mouse: bool,
+    bell: bool,
+    ascii: bool | None,
+) -> None:
+    """Show a record of a line, or of `drivepanel record`, as the panel showed the drives then.
+
+    Nothing is sent to a drive. Times without a date are local.
+    """
+    from tui.bus.errors import LinkSyntaxError
+    from tui.session.connect.line_key import REPLAY_PREFIX
+    from tui.session.record.replay_text import ReplayText, open_replay
+
+    wanted = ReplayText(file.absolute(), at or "")
+    try:
+        line = open_replay(wanted)
+    except LinkSyntaxError as error:
+        raise Failure(str(error), USAGE) from error
+    line.close()
+    if device is not None and device not in line.devices:
+        known = ", ".join(map(str, line.devices)) or "none"
+        raise Failure(f"Drive {device} is not in the record. Its drives: {known}.", USAGE)
+    run_panel(
+        f"{REPLAY_PREFIX}{wanted.text}",
+        device,
+        low_bandwidth=low_bandwidth,
+        mouse=mouse,
+        bell=bell,
+        ascii=ascii,
+    )

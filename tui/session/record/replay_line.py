@@ -1,0 +1,333 @@
+"""A line whose devices answer from a record, as they did then. Nothing is sent anywhere."""
+
+from __future__ import annotations
+
+import asyncio
+import sqlite3
+import threading
+from collections.abc import Callable, Coroutine, Sequence
+from concurrent.futures import Future
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from tui.bus.api import LineWorker
+from tui.bus.errors import (
+    LineClosed,
+    LineFailed,
+    LineLost,
+    LinkSyntaxError,
+    NoAnswer,
+    RequestRefused,
+)
+from tui.bus.expectation import IDENTIFY
+from tui.bus.limits import Limits
+from tui.bus.link import Link, SerialLink, TcpLink, parse_link
+from tui.bus.model import (
+    DeviceState,
+    IdentificationObjects,
+    LineCounters,
+    LineState,
+    LineStatus,
+    Priority,
+    Reply,
+    Timing,
+)
+from tui.bus.prepared import PreparedWrite
+from tui.bus.schedule.pace import Pace
+from tui.bus.schedule.worker import Worker
+from tui.bus.shared_state import SharedState
+from tui.bus.tally import Tally
+from tui.bus.trace import Frame
+
+from .newest import MeanOf, NewestReplies, RecordedReply, ReplayReader
+from .replay_clock import ReplayClock
+from .schema import GOOD, REFUSED, SILENT, EventRow, RecordDamaged, to_microseconds
+
+T = TypeVar("T")
+
+REPLAY_SENDS_NOTHING = "This is a replay: nothing is sent to a drive."
+NO_HOST = "replay.invalid"
+"""A name that no host can have: the line of a replay must never be reached."""
+STARTS_WITHIN = 10.0
+"""Seconds within which the thread of a line starts and ends."""
+_EVENTS = ("fault", "stop", "done", "failed", "alarm", "trigger", "notice", "commander")
+"""Kinds of recorded events to which a replay can jump."""
+
+
+class ReplayLine:
+    """A ModbusLine on a record; see tui.bus.api. Reads return what was known at the clock's time.
+
+    A drive that did not answer then does not answer now. What was never read raises NotRecorded.
+    """
+
+    def __init__(self, path: Path, at: float | None = None, *, lead: float = 0.0) -> None:
+        """Open a record, `lead` seconds before a time (since 1970; default: its begin).
+
+        Raises RecordDamaged, sqlite3.Error.
+        """
+        self.path = path
+        self._reader = ReplayReader(path)
+        try:
+            begin, end = (time / 1e6 for time in self._reader.span(path))
+            self.recorded_line = self._reader.line
+            self.devices = self._reader.devices()
+            self.events = tuple(self._reader.events_of(_EVENTS))
+            """Events to which a replay can jump, by time."""
+            self._profiles = self._reader.events_of(("profile",))
+            self._states = self._reader.events_of(("line",))
+        except BaseException:
+            self._reader.close()
+            raise
+        start = begin if at is None else min(max(at, begin), end)
+        self.at = start
+        """The time at which the replay begins, after `lead`."""
+        self.clock = ReplayClock(begin, end, max(begin, start - lead))
+        self.link = _link_of(self.recorded_line)
+        self.read_only = True
+        self.held = REPLAY_SENDS_NOTHING
+        self.timing = Timing()
+        self.pace = Pace()
+        self.facts = SharedState()
+        self.facts.gated = True
+        self.trace: tuple[Frame, ...] = ()
+        self._tally = Tally(clock=self.clock.monotonic)
+        self._newest: dict[int, NewestReplies] = {}
+        self._lock = threading.RLock()
+        """Held while the record is read."""
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._thread: threading.Thread | None = None
+        self._workers: set[asyncio.Task[object]] = set()
+        self._closed = False
+
+    # The record
+
+    def profile_note(self, device: int) -> EventRow | None:
+        """Return the event that names a device's profile by now; the first one if it came later."""
+        now = to_microseconds(self.clock.monotonic())
+        own = [event for event in self._profiles if event.device == device]
+        by_now = [event for event in own if event.utc <= now]
+        return by_now[-1] if by_now else own[0] if own else None
+
+    def identification(self, device: int, function: int) -> IdentificationObjects | None:
+        """Return what a device reported by a function; None if it is not recorded."""
+        try:
+            with self._lock:
+                return self._reader.identification(device, function)
+        except sqlite3.Error as error:
+            raise LineFailed(f"The record cannot be read: {error}.") from error
+
+    def use_means(self, device: int, mean_of: MeanOf) -> None:
+        """Set which registers of a device have a mean, for replies that were reduced."""
+        with self._lock:
+            self._of(device).mean_of = mean_of
+
+    def _of(self, device: int) -> NewestReplies:
+        """The newest replies of a device, at the present time; with the lock."""
+        if device not in self._newest:
+            self._newest[device] = NewestReplies(
+                self._reader, device, lambda reply: self._count(device, reply)
+            )
+        newest = self._newest[device]
+        newest.move(to_microseconds(self.clock.monotonic()))
+        return newest
+
+    def _count(self, device: int, reply: RecordedReply) -> None:
+        """Count an exchange of the record, as the line counted it then."""
+        tally = self._tally
+        tally.count_sent(device, 0)
+        tally.count_end(device, (reply.ended - reply.sent) / 1e6, 0)
+        if reply.quality in (GOOD, REFUSED):
+            tally.count_reply(device, (reply.ended - reply.sent) / 1e6)
+            tally.count_good(device, was_heard=True)
+            if reply.quality == REFUSED:
+                tally.count_exception(device, reply.received[1] if reply.received else 0)
+        elif reply.quality == SILENT:
+            tally.count_silence(device, searched=False)
+        else:
+            tally.count_checksum(device)
+            tally.count_minute(device, "damaged")
+
+    # A line
+
+    @property
+    def state(self) -> LineState:
+        """The state of the line at the time of the clock."""
+        if self._closed:
+            return LineState(LineStatus.CLOSED, "", self.clock.begin)
+        now = to_microseconds(self.clock.monotonic())
+        last = next((event for event in reversed(self._states) if event.utc <= now), None)
+        if last is None:
+            return LineState(LineStatus.CONNECTED, "", self.clock.begin)
+        status, _, reason = last.text.partition(" ")
+        with suppress(ValueError):
+            if (found := LineStatus(status)) in (LineStatus.LOST, LineStatus.CONNECTING):
+                return LineState(found, reason, last.utc / 1e6)
+        return LineState(LineStatus.CONNECTED, "", last.utc / 1e6)
+
+    @property
+    def counters(self) -> LineCounters:
+        """Counts of the exchanges that were replayed."""
+        return self._tally.frozen()
+
+    def open(self, *, wait: float | None = None) -> None:
+        """Start the thread of the line."""
+        started: Future[None] = Future()
+        self._thread = threading.Thread(
+            target=self._run, args=(started,), name="replay", daemon=True
+        )
+        self._thread.start()
+        started.result(STARTS_WITHIN)
+
+    def _run(self, started: Future[None]) -> None:
+        loop = self._loop = asyncio.new_event_loop()
+        loop.call_soon(started.set_result, None)
+        try:
+            loop.run_until_complete(self._work())
+        finally:
+            loop.close()
+
+    async def _work(self) -> None:
+        follower = asyncio.ensure_future(self.clock.follow())
+        self._workers.add(follower)
+        while not self._closed or self._workers:
+            await asyncio.wait(self._workers, timeout=0.05)
+            self._workers = {task for task in self._workers if not task.done()}
+            if self._closed:
+                for task in self._workers:
+                    task.cancel()
+
+    def close(self) -> None:
+        """Close the line; may be called twice."""
+        if self._closed:
+            return
+        self._closed = True
+        if self._thread is not None and self._thread is not threading.current_thread():
+            self._thread.join(STARTS_WITHIN)
+        with self._lock:
+            self._reader.close()
+
+    def describe(self, device: int, limits: Limits) -> None:
+        """Limits are those of the record."""
+
+    def device_state(self, device: int) -> DeviceState:
+        """Return what was known of a device."""
+        try:
+            with self._lock:
+                newest = self._of(device)
+        except sqlite3.Error:
+            return DeviceState(None, 0, None, None, None, None, None)
+        heard = None if newest.heard is None else newest.heard / 1e6
+        answers = None if heard is None and not newest.failures else not newest.failures
+        silent = heard if newest.failures else None
+        return DeviceState(answers, newest.failures, silent, None, None, None, heard)
+
+    async def read(
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
+        max_age: float = 0.0,
+        within: float | None = None,
+    ) -> Reply:
+        """Return the registers as they were read last; raises the recorded error."""
+        self._check()
+        try:
+            with self._lock:
+                words, ended = self._of(device).words(function, address, count)
+        except sqlite3.Error as error:
+            raise LineFailed(f"The record cannot be read: {error}.") from error
+        return Reply(words, ended / 1e6)
+
+    def _check(self) -> None:
+        if self._closed:
+            raise LineClosed
+        if (state := self.state).status is not LineStatus.CONNECTED:
+            raise LineLost(state.reason)
+
+    async def identify(
+        self,
+        device: int,
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+        within: float | None = None,
+        function: int = IDENTIFY,
+    ) -> IdentificationObjects:
+        """Return the identification that was recorded, before or after this time."""
+        if (found := self.identification(device, function)) is None:
+            raise NoAnswer(device, function, 0)
+        return found
+
+    async def write(self, device: int, address: int, values: Sequence[int], **_: Any) -> float:
+        """Refuse."""
+        raise RequestRefused(REPLAY_SENDS_NOTHING)
+
+    async def read_write(
+        self, device: int, read_address: int, count: int, write_address: int,
+        values: Sequence[int], **_: Any,
+    ) -> Reply:  # fmt: skip
+        """Refuse."""
+        raise RequestRefused(REPLAY_SENDS_NOTHING)
+
+    async def diagnose(self, device: int, subfunction: int, data: int = 0, **_: Any) -> int:
+        """Refuse."""
+        raise RequestRefused(REPLAY_SENDS_NOTHING)
+
+    async def broadcast(self, address: int, values: Sequence[int], **_: Any) -> float:
+        """Refuse."""
+        raise RequestRefused(REPLAY_SENDS_NOTHING)
+
+    def send_prepared(self, writes: Sequence[PreparedWrite], ended: Callable[[str], None]) -> None:
+        """Refuse."""
+        ended(REPLAY_SENDS_NOTHING)
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        """Run a coroutine in the line's own loop."""
+        loop = self._loop
+        if loop is None or self._closed:
+            raise LineClosed
+        worker = Worker(work, name, loop)
+
+        def start() -> None:
+            if (task := worker.start()) is not None:
+                self._workers.add(task)
+
+        try:
+            loop.call_soon_threadsafe(start)
+        except RuntimeError:
+            raise LineClosed from None
+        return worker
+
+    async def run_to(self, at: float) -> None:
+        """Go on to a later time, whatever the speed; for the loop of any thread."""
+        done: Future[object] = Future()
+
+        async def run() -> None:
+            try:
+                done.set_result(await self.clock.run_to(min(at, self.clock.end)))
+            except BaseException as error:
+                done.set_exception(error)
+                raise
+
+        self.spawn(run, "replay to a time")
+        await asyncio.wrap_future(done)
+
+
+def _link_of(line: str) -> Link:
+    """Return the recorded link, to plan reads as then; it leads to no port and no host."""
+    try:
+        link = parse_link(line)
+    except LinkSyntaxError:
+        return SerialLink("replay")
+    if isinstance(link, SerialLink):
+        return replace(link, path="replay")
+    if isinstance(link, TcpLink):
+        return replace(link, host=NO_HOST)
+    return replace(link, host=NO_HOST)
+
+
+__all__ = ["REPLAY_SENDS_NOTHING", "RecordDamaged", "ReplayLine"]

@@ -1,0 +1,117 @@
+"""The drives of a replay: each with the profile and the identity that the record names."""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+from tui.bus.expectation import IDENTIFY, REPORT_ID
+from tui.drive.errors import DriveError
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile, digest_of
+from tui.drive.values import word_count
+
+from .connect.identify import DriveIdentity, identity_from
+from .drive import DriveSession
+from .fleet import Fleet
+from .journal import Entry, Journal
+from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
+
+EXACT_LEAD = 60.0
+"""Seconds before the time of a replay that pass as they were."""
+LEAD_SLEEP = 5.0
+"""Seconds of each sleep in those before; more with many drives."""
+OTHER_PROFILE = (
+    "Drive {device}: profile {profile} has changed since the record was made. Values may be shown"
+    " differently."
+)
+NO_PROFILE = "Drive {device}: {error} Its values are not shown."
+UNNAMED = "Drive {device}: the record does not name its profile. Its values are not shown."
+
+
+class UnwrittenJournal(Journal):
+    """A journal for a replay: nothing that happens in it is recorded."""
+
+    def add(self, entry: Entry, *, sent: bool = True) -> None:
+        """Do nothing."""
+
+
+class NamedProfile(NamedTuple):
+    """The profile of a drive, as the record names it."""
+
+    id: str = ""
+    hash: str = ""
+    reference: str = ""
+    version: str = ""
+
+
+def named_profile(line: ReplayLine, device: int) -> NamedProfile:
+    """Return the profile of a device at the present time; empty if the record names none."""
+    event = line.profile_note(device)
+    if event is None:
+        return NamedProfile()
+    try:
+        about = json.loads(event.text)
+        known = {name: str(about.get(name) or "") for name in ("hash", "reference", "version")}
+        return NamedProfile(str(about["profile"]), **known)
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return NamedProfile()
+
+
+def take_drives(line: ReplayLine, fleet: Fleet) -> list[str]:
+    """Add the drives of a record to a fleet; return what a person should know about them.
+
+    It reads files, in the caller's thread.
+    """
+    reported = []
+    for device in line.devices:
+        named = named_profile(line, device)
+        identity = _identity(line, device, named)
+        if not (id := named.id or identity.profile):
+            fleet.note(identity)
+            reported.append(UNNAMED.format(device=device))
+            continue
+        try:
+            profile = library.load(id)
+        except DriveError as error:
+            fleet.note(identity)
+            reported.append(NO_PROFILE.format(device=device, error=error))
+            continue
+        line.use_means(device, _means(profile).get)
+        session = DriveSession(line, device, profile, identity, line.clock)
+        session.arming.why_disarmed = REPLAY_SENDS_NOTHING
+        fleet.take(session)
+        if named.hash and named.hash != digest_of(profile):
+            reported.append(OTHER_PROFILE.format(device=device, profile=id))
+    return reported
+
+
+def _identity(line: ReplayLine, device: int, named: NamedProfile) -> DriveIdentity:
+    """Return the identity that the drive reported then, else that of the note."""
+    for function in (IDENTIFY, REPORT_ID):
+        if (found := line.identification(device, function)) is not None:
+            return identity_from(device, found)
+    known = named.id or None
+    candidates = (known,) if known else ()
+    return DriveIdentity(device, "", named.reference, named.version, "", known, candidates)
+
+
+def _means(profile: Profile) -> dict[tuple[int, int], bool]:
+    """Return the registers that hold a quantity, with True for the signed ones."""
+    found: dict[tuple[int, int], bool] = {}
+    for parameter in profile.data.parameters:
+        is_number = bool(parameter.unit) and not parameter.bits and not profile.names(parameter)
+        if is_number and word_count(parameter) == 1:
+            signed = parameter.type.startswith("int")
+            found[parameter.function, parameter.address] = signed
+    return found
+
+
+async def pass_lead(line: ReplayLine, drives: int) -> None:
+    """Go from the lead to the time of the replay, with all that happened on the way."""
+    clock, exact = line.clock, line.at - EXACT_LEAD
+    if clock.monotonic() < exact:
+        clock.least_sleep = max(LEAD_SLEEP, float(drives))
+        await line.run_to(exact)
+        clock.least_sleep = 0.0
+    await line.run_to(line.at)
