@@ -174,7 +174,7 @@ class LineOwner(Panel):
             from tui.session.connect.known_line import KnownLine
 
             opened.known = KnownLine(opened.line, way=WAY_TO_ACCEPT)
-        elif opened.recorder is None:
+        elif opened.simulation is not None and opened.recorder is None:
             opened.record_privately()
         # imported here, in a thread, because the loop needs them next and would block on them
         import tui.screens.monitor.screen
