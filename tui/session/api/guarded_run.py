@@ -9,10 +9,9 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from tui.bus.api import LineWorker
-from tui.bus.errors import LineClosed, LineError
+from tui.bus.errors import LineClosed
 from tui.drive.chart import Direction
 from tui.drive.errors import DriveError
-from tui.drive.orders import OrderRefused
 
 from ..command.stop_report import not_stopped
 from ..console import DriveConsole
@@ -21,8 +20,8 @@ from ..monitor.snapshot import Snapshot
 from ..running.ending import Ending
 from ..running.errors import NotStopped
 from ..running.motor_run import MotorRun, RunEvent
-from ..running.watching import WATCH_PERIOD, first_cycle, outcome_of
-from ..work import OutcomeKind, Permit
+from ..running.watching import WATCH_PERIOD, first_cycle, outcome_or_error
+from ..work import Permit
 
 log = logging.getLogger(__name__)
 
@@ -163,15 +162,10 @@ class GuardedRun:
 
     async def _command(self, permit: Permit) -> None:
         commander = self._console.commander
-        outcome = await outcome_of(
+        await outcome_or_error(
             commander,
             lambda: commander.run(self._direction, self._reference, permit.stamp),
         )
-        if outcome is None:
-            raise OrderRefused("Not sent: superseded by a newer command.")
-        if outcome.kind is OutcomeKind.REFUSED:
-            error = outcome.error
-            raise error if isinstance(error, LineError | DriveError) else DriveError(outcome.text)
         self.is_started.set()
 
     # Reports of the run

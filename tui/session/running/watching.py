@@ -7,8 +7,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineError
+from tui.drive.errors import DriveError
+from tui.drive.orders import OrderRefused
 
 from ..patience import patience
+from ..work import OutcomeKind
 
 if TYPE_CHECKING:
     from ..command.commander import Commander
@@ -88,3 +91,14 @@ async def outcome_of(commander: Commander, give: Callable[[], None]) -> Outcome 
         if work.outcome is not before or not work.busy_for(commander):
             return work.outcome if work.outcome is not before else None
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
+
+
+async def outcome_or_error(commander: Commander, give: Callable[[], None]) -> Outcome:
+    """Send a command and return its outcome. Raises DriveError and the line's errors."""
+    outcome = await outcome_of(commander, give)
+    if outcome is None:
+        raise OrderRefused("Not sent: superseded by a newer command.")
+    if outcome.kind is OutcomeKind.REFUSED:
+        error = outcome.error
+        raise error if isinstance(error, LineError | DriveError) else DriveError(outcome.text)
+    return outcome
