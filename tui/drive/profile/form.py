@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import math
 import re
 from dataclasses import dataclass, field
 from functools import lru_cache
@@ -113,13 +114,8 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
     match shape:
         case shapes.BoolType():
             return "" if isinstance(value, bool) else f"must be true or false, not {reported}"
-        case shapes.IntType(ge=low, le=high):
-            if isinstance(value, bool) or not isinstance(value, int):
-                return _within(f"must be of type int, not {reported}", low, high)
-            if low is not None and value < low:
-                return _within(f"must be >= {low}, not {value}", low, high)
-            if high is not None and value > high:
-                return _within(f"must be <= {high}, not {value}", low, high)
+        case shapes.IntType() | shapes.FloatType():
+            return _number_fault(shape, value)
         case shapes.StrType(pattern=pattern):
             if not isinstance(value, str):
                 return f"must be of type str (a text in quotes), not {reported}"
@@ -131,6 +127,21 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
                 return _instead(f"{value!r} is not an allowed value", value, values)
         case _:
             return f"must be {_kind(shape)}, not {reported}"
+    return ""
+
+
+def _number_fault(shape: shapes.IntType | shapes.FloatType, value: Any) -> str:
+    low, high = shape.ge, shape.le
+    kinds = (int,) if isinstance(shape, shapes.IntType) else (int, float)
+    if isinstance(value, bool) or not isinstance(value, kinds):
+        wanted = "of type int" if len(kinds) == 1 else "a number"
+        return _within(f"must be {wanted}, not {type(value).__name__}", low, high)
+    if not math.isfinite(value):
+        return _within(f"must be a finite number, not {value}", low, high)
+    if low is not None and value < low:
+        return _within(f"must be >= {low}, not {value}", low, high)
+    if high is not None and value > high:
+        return _within(f"must be <= {high}, not {value}", low, high)
     return ""
 
 
@@ -159,7 +170,7 @@ def _kind(shape: shapes.Type) -> str:
             return f"a list whose entries are each {_kind(shape.item_type)}"
         case shapes.LiteralType(values=values):
             return f"one of {', '.join(map(str, values[:LISTED_SINGLY]))}"
-        case shapes.IntType(ge=low, le=high):
+        case shapes.IntType(ge=low, le=high) | shapes.FloatType(ge=low, le=high):
             no_limit = low is None and high is None
             return "a number" if no_limit else f"a number from {low} to {high}"
         case shapes.BoolType():
@@ -180,7 +191,7 @@ def _invented(shape: shapes.Type) -> Any:
             return {field.encode_name: _invented(field.type) for field in fields if field.required}
         case shapes.LiteralType(values=values):
             return values[0]
-        case shapes.IntType(ge=low):
+        case shapes.IntType(ge=low) | shapes.FloatType(ge=low):
             return low or 0
         case shapes.BoolType():
             return False

@@ -299,7 +299,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
 
 
 @lru_cache(maxsize=128)
-def _written_below(table: type) -> Mapping[str, str]:
+def texts_below(table: type) -> Mapping[str, str]:
     """Return the texts below the fields of a table in its source."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(table))).body[0]
     body = tree.body if isinstance(tree, ast.ClassDef) else []
@@ -318,7 +318,7 @@ def field_text(table: str, field: str) -> str:
     struct = getattr(schema, table, None)
     kinds = struct.__mro__ if isinstance(struct, type) else ()
     for kind in (cls for cls in kinds if cls.__module__.startswith(schema.__name__)):
-        if text := _written_below(kind).get(field) or OWN.get(kind.__name__, {}).get(field):
+        if text := texts_below(kind).get(field) or OWN.get(kind.__name__, {}).get(field):
             return text
     return COMMON.get(field, "")
 
