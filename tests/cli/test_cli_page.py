@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
+import shutil
 from pathlib import Path
 
 import pytest
@@ -77,6 +78,7 @@ def test_commands_of_a_section_run_as_printed(
         elif not words or words[0] in PANEL:
             assert "needs a terminal" in ended(2, *words).stderr
         else:
+            shutil.copy(DOCS / "acceptance" / "atv312.toml", tmp_path)
             with monkeypatch.context() as there:
                 there.chdir(tmp_path)  # separate programs run in the checkout
                 assert ended(status, *words).exit_code == status, line

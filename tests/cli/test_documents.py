@@ -101,8 +101,8 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
 }  # fmt: skip
 """By name: exit status, words, and the forms of the documents. FOLDER is that of the fixture."""
 ELSEWHERE = {
-    "RunDocument", "HoldDocument", "ProveDocument", "SimulationReady", "InputsDocument",
-    "BenchDocument", "BenchWaitsDocument", "BenchRefusedDocument",
+    "RunDocument", "HoldDocument", "ProveDocument", "AcceptDocument", "SimulationReady",
+    "InputsDocument", "BenchDocument", "BenchWaitsDocument", "BenchRefusedDocument",
     "ServeReady", "PublishReady", "ScanSlowDocument", "ScanUnclearDocument", "PortDocument",
 }  # fmt: skip
 """Forms of the tests below; this computer may have no port."""
@@ -252,6 +252,7 @@ def test_every_command_has_json() -> None:
         "simulate",
         "hold",
         "prove",
+        "accept",
     }
     assert tried == set(COMMANDS) - NO_JSON
     for name in tried:

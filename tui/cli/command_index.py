@@ -6,6 +6,7 @@ Made by `python -m tui.cli.derived`.
 from __future__ import annotations
 
 COMMANDS: dict[str, tuple[str, str]] = {
+    "accept": ("accept", "Run an acceptance test from a file."),
     "backup": ("backup", "Back up a drive's settings to a file."),
     "block": ("block", "Show or change a drive's indirect block or scanner."),
     "bundle": ("bundle", "Collect all evidence about a line in one file."),

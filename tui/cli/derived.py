@@ -1,6 +1,6 @@
 """Everything that is made from the registrations of the commands.
 
-`python -m tui.cli.derived` writes it: the index of commands, the manual page, the JSON Schema, and
+`python -m tui.cli.derived` writes it: the index of commands, the manual page, the JSON Schemas, and
 the table of commands in docs/cli.md. Tests compare each.
 
 Fields of the schema are added, never renamed, while `schema` stays 1. It describes output: a field
@@ -23,6 +23,7 @@ import msgspec
 import tui
 from tui import cli
 from tui.drive.small_file import read_small_text
+from tui.session.acceptance.schema import acceptance_schema
 
 from . import commands
 from .command_index import COMMANDS
@@ -275,6 +276,7 @@ def write_derived() -> None:
         (CLI / "command_index.py", command_index()),
         (DOCS / "cli.schema.json", documents_schema()),
         (DOCS / "drivepanel.1", man_page()),
+        (DOCS / "acceptance" / "acceptance.schema.json", acceptance_schema()),
         (DOCS / "cli.md", with_table(page)),
     ):
         path.write_text(text, encoding="utf-8")

@@ -22,10 +22,17 @@ async def says_yes(question: str) -> bool:
 
     The loop runs on, and may be cancelled.
     """
+    return (await typed_answer(f"{question} [y/N]")).casefold() in YES
+
+
+async def typed_answer(question: str) -> str:
+    """Show a question on standard error, and return the line that is typed.
+
+    The loop runs on, and may be cancelled.
+    """
     _forget_typed()
-    say_prompt(f"{question} [y/N]")
-    answer = await _typed_line()
-    return answer.strip().casefold() in YES
+    say_prompt(question)
+    return (await _typed_line()).strip()
 
 
 def _forget_typed() -> None:
