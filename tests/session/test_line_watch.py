@@ -162,3 +162,16 @@ async def test_drive_is_kept_alive_while_its_timeout_is_learned(
     assert kept.watch.watch(1) is None
     kept.line.answers.set()
     await until(lambda: kept.watch.watch(1) is not None)
+
+
+async def test_drive_is_checked_soon_after_a_stop_has_ended(
+    keep: Callable[[int], Kept], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Line showed STOPPING for up to 3 s after the report that the motor is stopped."""
+    monkeypatch.setattr("tui.session.monitor.line_watch.EARLY", 0.01)
+    monkeypatch.setattr("tui.session.monitor.line_watch.GLANCE", 6000.0)
+    kept = keep(35)
+    await until(lambda: 1 in kept.watch.looks)
+    before = kept.watch.looks[1].time
+    kept.watch._kept[1].session.request_full_read()
+    await until(lambda: kept.watch.looks[1].time > before)

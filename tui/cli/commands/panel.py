@@ -69,6 +69,17 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
     )
 
 
+def _as_used_last(line_text: str) -> str:
+    """Return a port that names no settings with those of its last use, as the form of Line does."""
+    from tui.session.connect.named_lines import named_lines
+    from tui.session.connect.port_settings import with_last_settings
+    from tui.session.paths import recent_lines
+
+    if any(line.line == line_text for line in named_lines().values()):
+        return line_text  # what the settings file says
+    return with_last_settings(line_text, recent_lines())
+
+
 @command("Open the panel.", hidden=True)
 @click.argument(
     "line_text",
@@ -111,7 +122,7 @@ def panel(
 
         raise click.UsageError(no_such_command(line_text))
     run_panel(
-        line_text,
+        None if line_text is None else _as_used_last(line_text),
         device,
         read_only=read_only,
         low_bandwidth=low_bandwidth,

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from rich.style import Style
 from rich.text import Text
@@ -16,11 +15,9 @@ from tui.drive.plain import plain
 from tui.drive.profile.library import demo_drives
 from tui.session.connect.named_lines import LineSettings, line_named
 from tui.session.connect.open_line import check_line
+from tui.session.connect.port_settings import PortSettings, last_settings, port_of
 from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT, FAULT, PLAIN, RUNNING, STRONG
-
-if TYPE_CHECKING:
-    from tui.bus.link import SerialLink
 
 _LASTING = re.compile(r"(?:serial:)?/dev/serial/by-(?:id|path)/(?:usb-)?")
 COUNTED = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
@@ -53,15 +50,6 @@ def simulated_lines() -> tuple[tuple[str, str], ...]:
         (f"sim:{fastest}@2", f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"),
         (f"sim:{fastest}@2,{first}", "two drives"),
     )
-
-
-class PortSettings(NamedTuple):
-    """Settings with which a serial port was used last."""
-
-    baud: int
-    format: str
-    timeout: float | None = None
-    """Longest wait for a reply in seconds, if a person has set it."""
 
 
 class LineChoice(NamedTuple):
@@ -102,14 +90,16 @@ def groups(
     """Return the groups in display order; `ports` are pairs of path and description.
 
     `recent` are lines used lately, the last one first. A listed port takes its last settings from
-    them: it has one entry, whatever name it was used by.
+    them: it has one entry, whatever name it was used by. The port of a named line is listed there.
     """
-    used = _port_settings(recent) if ports else {}
+    used = last_settings(recent) if ports else {}
+    named = {port_of(line.line) for line in settings.lines.values()} if settings else set()
     serial = tuple(
         LineChoice(path, description, path, settings=used.get(os.path.realpath(path)))
         for path, description in ports
+        if os.path.realpath(path) not in named
     )
-    listed = {os.path.realpath(path) for path, _ in ports}
+    listed = {os.path.realpath(choice.path) for choice in serial}
     lately = tuple(
         LineChoice(text, "")
         for text in recent
@@ -117,36 +107,10 @@ def groups(
     )
     return [
         *_named(settings),
-        Group("Serial ports", serial, "none found"),
+        Group("Serial ports", serial, "" if ports else "none found"),
         Group("Recent", lately, "none yet (n: type one)"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in simulated_lines()[:2])),
     ]
-
-
-def _port_settings(recent: Sequence[str]) -> dict[str, PortSettings]:
-    """Return the last settings of each serial port by its real path."""
-    found: dict[str, PortSettings] = {}
-    for text in recent:
-        if (link := _serial_link(text)) is not None:
-            settings = PortSettings(link.baud, link.format, link.timeout)
-            found.setdefault(os.path.realpath(link.path), settings)
-    return found
-
-
-def port_of(text: str) -> str:
-    """Return the real path of the port of a serial line; empty for another line."""
-    link = _serial_link(text)
-    return os.path.realpath(link.path) if link is not None else ""
-
-
-def _serial_link(text: str) -> SerialLink | None:
-    from tui.bus.link import SerialLink, parse_link
-
-    try:
-        link = parse_link(text)
-    except LinkSyntaxError:
-        return None  # a simulated line
-    return link if isinstance(link, SerialLink) else None
 
 
 def _named(settings: LineSettings | None) -> list[Group]:

@@ -16,12 +16,13 @@ from textual.widgets import Input
 
 from tui.drive.plain import plain
 from tui.session.connect.addresses import parse_addresses
+from tui.session.connect.port_settings import PortSettings
 from tui.widgets.fields import NumberInput, WordField
 from tui.widgets.lines import Lines
 from tui.widgets.palette import SURFACE, TEXT
 from tui.widgets.plain import Plain
 
-from .choices import LineChoice, PortSettings
+from .choices import LineChoice
 
 FIELD_NAME_CELLS = 11
 FORMAT_CELLS = 4

@@ -10,12 +10,13 @@ from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from tui.session.connect.named_lines import line_settings
+from tui.session.connect.port_settings import port_of
 from tui.session.paths import recent_lines
 from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT
 from tui.widgets.plain import entry
 
-from .choices import Group, LineChoice, ListMark, choice_line, groups, port_of
+from .choices import Group, LineChoice, ListMark, choice_line, groups, same_line
 
 
 class LineList(OptionList):
@@ -50,9 +51,18 @@ class LineList(OptionList):
         if self._named:
             lately = [self._named, *(text for text in lately if text != self._named)]
         settings = line_settings()
-        known = {line.line for line in settings.lines.values()}
-        recent = [text for text in lately if text not in known]
+        known = [line.line for line in settings.lines.values()]
+        ports = {port for line in known if (port := port_of(line))}
+        recent = [
+            text
+            for text in lately
+            if text not in known and (port_of(text) not in ports or self._is_offered(text, known))
+        ]
         self._groups = groups(serial_ports(), recent, settings)
+
+    def _is_offered(self, text: str, known: Sequence[str]) -> bool:
+        """Return True for the offered line, unless a named line is the same."""
+        return text == self._named and not any(same_line(text, line) for line in known)
 
     def choice(self, id: str | None) -> LineChoice | None:
         """Return the line of an option; None for a heading."""
@@ -75,7 +85,9 @@ class LineList(OptionList):
         fits = [
             id
             for id, choice in self._choices.items()
-            if choice.text == text or (port and choice.path and port == port_of(choice.path))
+            if choice.text == text
+            or (port and choice.path and port == port_of(choice.path))
+            or (port and choice.name and same_line(choice.text, text))
         ]
         if fits:
             self.highlighted = self.get_option_index(fits[0])

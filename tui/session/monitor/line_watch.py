@@ -11,6 +11,7 @@ import logging
 import threading
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 from tui.bus.api import Contact, LineWorker, ModbusLine, Priority, contact_of
 from tui.bus.errors import LineError, LineLost
@@ -50,6 +51,8 @@ GLANCE_EACH = 0.15
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's timeout and reaction are read again: someone may change them."""
 SHORTEST = 0.02
+EARLY = 0.25
+"""Seconds after which a check follows a request to read the whole drive, at most."""
 
 
 @dataclass(slots=True)
@@ -184,9 +187,11 @@ class LineWatch:
             self._kept = {**self._kept, device: kept}
             # before the timeout is known, too: reads of missing words may take seconds
             self._keep_alive(kept, UNKNOWN_TIMEOUT)
+        learn = partial(self._again, kept, self._learn)
+        glance = partial(self._again, kept, self._glance, early=True)
         kept.workers = (
-            self._line.spawn(lambda: self._again(kept, self._learn), f"learner {device}"),
-            self._line.spawn(lambda: self._again(kept, self._glance), f"line_watch {device}"),
+            self._line.spawn(learn, f"learner {device}"),
+            self._line.spawn(glance, f"line_watch {device}"),
         )
 
     def stop(self) -> None:
@@ -210,8 +215,14 @@ class LineWatch:
         else:
             self._line.facts.keep_alives.keep(read)
 
-    async def _again(self, kept: _Kept, step: Callable[[_Kept], Awaitable[float]]) -> None:
-        """Repeat a step forever; it returns the seconds until the next call."""
+    async def _again(
+        self, kept: _Kept, step: Callable[[_Kept], Awaitable[float]], *, early: bool = False
+    ) -> None:
+        """Repeat a step forever; it returns the seconds until the next call.
+
+        With `early` the next call comes soon after a full read of the drive is requested, for
+        example at the end of a stop.
+        """
         while True:
             try:
                 rest = await step(kept)
@@ -223,7 +234,12 @@ class LineWatch:
                 # an error with one drive must not end the checks of the others
                 log.exception("looking after device %s failed", kept.session.device)
                 rest = GLANCE
-            await kept.session.clock.sleep(max(SHORTEST, rest))
+            rest = max(SHORTEST, rest)
+            requested = kept.session.full_reads_requested
+            while rest > 0 and not (early and kept.session.full_reads_requested != requested):
+                part = min(rest, EARLY) if early else rest
+                await kept.session.clock.sleep(part)
+                rest -= part
 
     @staticmethod
     def _after_failure(kept: _Kept) -> float:
