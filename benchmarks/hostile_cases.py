@@ -276,8 +276,8 @@ def _put(path: Path, text: bytes, chance: random.Random) -> None:
 
 
 def _read_state(folder: Path, taught: Any) -> None:
-    from tui.cli.commands.journal import entry_line
-    from tui.cli.documents.other_documents import JournalEntryField
+    from tui.cli.commands.journal import change_line
+    from tui.cli.documents.journal_documents import JournalEntryField
     from tui.cli.shared.output import json_text
     from tui.cli.shared.say import printable
     from tui.screens.keys import first_keys
@@ -307,8 +307,8 @@ def _read_state(folder: Path, taught: Any) -> None:
         entries = [e for e in read_journal(Journal().files) if isinstance(e, Entry)]
     except OSError:
         entries = []
-    for entry in selected(completed(entries), device=1, line="tcp:x:502"):
-        no_commands(printable(entry_line(entry), "utf-8"))
+    for entry in selected(completed(entries), device=1, lines=["tcp:x:502"]):
+        no_commands(printable(change_line(entry), "utf-8"))
         no_commands(json_text(JournalEntryField(**asdict(entry))))
     for found in Starts().all_found("tcp:x:502"):
         offer(found, DriveIdentity(1, "", "", "", "", None, ()), True)

@@ -1,7 +1,8 @@
-"""`drivepanel journal`: writes, by drive and time."""
+"""`drivepanel journal`: writes, trips, runs and lost links, by drive and time."""
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 from dataclasses import asdict, replace
@@ -11,8 +12,10 @@ from typing import Any, get_args, get_type_hints
 
 import pytest
 
+from tests.session import test_changes as changes
 from tests.session.test_journal import entry
-from tui.cli.commands.journal import entry_line, since
+from tui.cli.commands.journal import CHANGE_COLUMNS, change_line
+from tui.session.changes import parse_since
 from tui.session.journal import Entry
 
 from .commands import ended, held, put, refused, run, tcp_line
@@ -50,8 +53,8 @@ def test_journal_lists_writes_and_reports_damage(journal: Path) -> None:
 
 def test_entry_begins_with_its_local_time() -> None:
     made = replace(entry(1), time="2026-11-26T14:05:09.123+00:00")
-    assert entry_line(made).startswith("2026-11-26 14:05:09  1/")
-    assert entry_line(replace(made, time="cut off")).startswith("cut off  1/")
+    assert change_line(made).startswith("2026-11-26 14:05:09  1/")
+    assert change_line(replace(made, time="cut off")).startswith("cut off  1/")
 
 
 def test_entries_are_selected_by_drive_and_time(journal: Path) -> None:
@@ -80,6 +83,71 @@ def test_journal_as_json_has_entries_and_damage(journal: Path) -> None:
     assert [item["new_raw"] for item in reported["entries"]] == [1, 3]
     assert set(reported["entries"][0]) == set(asdict(entry(1)))
     assert reported["damaged"] == [{"file": str(journal), "line": 4, "text": '{"ha\x1b]0;lf'}]
+
+
+@pytest.fixture
+def record(journal: Path) -> Path:
+    """A record with a run of drive 1, and a lost line."""
+    rows = [changes.status(0, changes.READY), *changes.each_second(1, 9, changes.FORWARD)]
+    rows += [changes.status(9, changes.READY), changes.row(2.5, changes.REFERENCE, 400)]
+    rows.append(changes.row(0.5, changes.COMMAND, 0xF, function=6, who=changes.PROGRAM))
+    events = [
+        changes.event(20, "line", "lost Broken pipe"),
+        changes.event(25, "line", "connected"),
+    ]
+    folder = journal.parent / "record"
+    changes.write(folder, rows, events)
+    return folder
+
+
+def test_journal_lists_runs_and_lost_lines_in_order(record: Path) -> None:
+    run_line, lost, *entries = ended(0, "journal").stdout.splitlines()
+    assert f"  1/{changes.LINE}  RUN forward at 40.0 Hz until " in run_line
+    assert run_line.endswith(f" by {changes.PROGRAM}")
+    assert f"  line/{changes.LINE}  LINE LOST until " in lost
+    assert lost.endswith(" (5 s): Broken pipe")
+    assert len(entries) == 3
+
+
+def test_json_has_trips_runs_and_lost_links(record: Path) -> None:
+    printed = run(0, "journal", "--json")
+    forms_of(printed)
+    reported = json.loads(printed)
+    (found,) = reported["runs"]
+    assert (found["device"], found["reference"], found["who"]) == (1, "40.0 Hz", changes.PROGRAM)
+    assert (found["begin_seen"], found["end_seen"], found["least"]) == (True, True, None)
+    begun, end = (datetime.fromisoformat(found[key]).timestamp() for key in ("begun", "ended"))
+    assert (begun, end) == (changes.START + 1, changes.START + 9)
+    assert found["within"] == pytest.approx(1, abs=0.01)
+    (lost,) = reported["lost"]
+    assert (lost["device"], lost["reason"]) == (None, "Broken pipe")
+    (trip,) = reported["trips"]
+    assert (trip["code"], trip["tripped"]) == ("ObF", None)
+
+
+def test_csv_has_every_change_with_both_times(record: Path, tmp_path: Path) -> None:
+    file = tmp_path / "changes.csv"
+    assert run(0, "journal", "--csv", str(file)) == ""
+    rows = list(csv.DictReader(file.read_text("utf-8").splitlines()))
+    assert list(rows[0]) == [column.title for column in CHANGE_COLUMNS]
+    assert [row["kind"] for row in rows] == ["run", "lost", "write", "write", "fault"]
+    assert rows[0]["time UTC"] == "2024-10-04T22:00:01.000Z"
+    assert rows[0]["until UTC"] == "2024-10-04T22:00:09.000Z"
+    for row in rows:
+        utc, local = (datetime.fromisoformat(row[f"time {zone}"]) for zone in ("UTC", "local"))
+        assert utc == local
+    assert "already exists" in refused(2, "journal", "--csv", str(file))
+    assert run(0, "journal", "--csv", str(file), "--force", "--since", "1m") == ""
+    assert file.read_text("utf-8").splitlines() == [",".join(rows[0])]
+    assert "--force requires --csv" in refused(2, "journal", "--force")
+
+
+def test_unreadable_record_is_reported_beside_the_others(record: Path) -> None:
+    (record / "2024-10-04_line-9.sqlite").write_bytes(b"x" * 100)
+    done = ended(0, "journal")
+    assert "RUN forward" in done.stdout
+    assert "2024-10-04_line-9.sqlite: " in done.stderr
+    assert len(json.loads(run(0, "journal", "--json"))["unread"]) == 1
 
 
 def test_missing_or_unreadable_journal_is_reported() -> None:
@@ -116,4 +184,4 @@ def test_write_is_listed_in_the_journal() -> None:
     ],
 )
 def test_since_accepts_durations_times_and_dates(text: str, wanted: datetime | None) -> None:
-    assert since(text, NOW) == wanted
+    assert parse_since(text, NOW) == wanted

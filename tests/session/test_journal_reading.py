@@ -123,7 +123,7 @@ def test_entries_are_selected_by_drive_line_and_time() -> None:
     assert numbers() == [1, 2, 3, 4]
     assert numbers(device=2) == [2]
     # however it was typed
-    assert numbers(line="tcp:HOST") == [1, 2]
-    assert numbers(line="tcp:host", device=1) == [1]
+    assert numbers(lines=["tcp:HOST"]) == [1, 2]
+    assert numbers(lines=["tcp:host"], device=1) == [1]
     # undecidable entries are kept
     assert numbers(since=datetime(2026, 3, 1, 9, tzinfo=UTC)) == [2, 3, 4]

@@ -15,7 +15,7 @@ COMMANDS: dict[str, tuple[str, str]] = {
     "demo": ("panel", "Open the panel on five running simulated drives."),
     "hold": ("hold", "Keep polling drives so that they do not time out."),
     "identify": ("identify", "Show a drive's vendor, model and version."),
-    "journal": ("journal", "Show writes made to drives by Drive Panel."),
+    "journal": ("journal", "Show writes, trips, runs and lost links of drives."),
     "lines": ("lines", "List named and remembered lines."),
     "listen": ("listen", "Monitor traffic on a line; send nothing."),
     "ports": ("ports", "List the serial ports of this computer."),

@@ -79,20 +79,20 @@ def selected(
     entries: Iterable[Entry],
     *,
     device: int | None = None,
-    line: str = "",
+    lines: Iterable[str] = (),
     since: datetime | None = None,
 ) -> list[Entry]:
-    """Select entries by drive, by line however it was typed, and by time.
+    """Select entries by drive, by lines however they were typed, and by time.
 
     An entry without a valid time is kept, because it may be in the range.
     """
-    key = line_key(line) if line else ""
+    wanted = {line_key(line) for line in lines}
     keys: dict[str, str] = {}
 
     def fits(item: Entry) -> bool:
         if device is not None and item.device != device:
             return False
-        if key and keys.setdefault(item.line, line_key(item.line)) != key:
+        if wanted and keys.setdefault(item.line, line_key(item.line)) not in wanted:
             return False
         when = time_of(item)
         return since is None or when is None or when >= since

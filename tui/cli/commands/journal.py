@@ -1,10 +1,10 @@
-"""`drivepanel journal`: what was written to drives from here, and which trips were seen."""
+"""`drivepanel journal`: writes, trips, runs and lost links on the lines of this computer."""
 
 from __future__ import annotations
 
-import re
-from dataclasses import asdict, dataclass
-from datetime import datetime, time, timedelta
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -13,14 +13,24 @@ from ..shared.errors import USAGE, Failure
 from ..shared.options import json_option
 from ..shared.output import print_json
 from ..shared.registration import command
+from ..shared.rows import Column
 from ..shared.say import say
 
 if TYPE_CHECKING:
+    from tui.session.changes import Change, ChangeList
     from tui.session.journal import Entry
-    from tui.session.journal_reading import DamagedLine
 
-_SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
-_AGO = re.compile(r"(\d{1,9})\s*([smhdw])")
+
+CHANGE_COLUMNS = tuple(
+    map(
+        Column,
+        (
+            *("time UTC", "time local", "kind", "line", "device", "profile", "code", "old", "new"),
+            *("until UTC", "until local", "reference", "reply", "who", "why"),
+        ),
+    )
+)
+"""Columns of the CSV file."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,35 +51,18 @@ def _wanted_drive(_ctx: click.Context, _option: click.Parameter, text: str) -> W
     return WantedDrive(device, line)
 
 
-def _begin(_ctx: click.Context, _option: click.Parameter, text: str | None) -> datetime | None:
-    """The time that was typed, in the zone of here."""
+def time_typed(_ctx: click.Context, _option: click.Parameter, text: str | None) -> datetime | None:
+    """The time that was typed, in the local zone."""
+    from tui.session.changes import TIME_EXAMPLES, parse_since
+
     if text is None:
         return None
-    if (found := since(text, datetime.now().astimezone())) is None:
-        raise click.BadParameter(
-            f"{text!r} is not a time. Examples: 2h, 30m, 7d, 08:30, 2026-03-01, 2026-03-01T08:30."
-        )
+    if (found := parse_since(text, datetime.now().astimezone())) is None:
+        raise click.BadParameter(f"{text!r} is not a time. Examples: {TIME_EXAMPLES}.")
     return found
 
 
-def since(text: str, now: datetime) -> datetime | None:
-    """The time that a text means; None where it means none. A time of day is the last one."""
-    text = text.strip()
-    try:
-        if ago := _AGO.fullmatch(text):
-            return now - timedelta(seconds=int(ago[1]) * _SECONDS[ago[2]])
-        if re.fullmatch(r"\d\d?:\d\d(:\d\d)?", text):
-            clock_time = time.fromisoformat(
-                text.rjust(5, "0") if len(text) < 6 else text.rjust(8, "0")
-            )
-            then = datetime.combine(now.date(), clock_time).astimezone()
-            return then if then <= now else then - timedelta(days=1)
-        return datetime.fromisoformat(text).astimezone()
-    except (ValueError, OverflowError, OSError):
-        return None
-
-
-@command("Show writes made to drives by Drive Panel.")
+@command("Show writes, trips, runs and lost links of drives.")
 @click.option(
     "--drive",
     "wanted",
@@ -81,76 +74,133 @@ def since(text: str, now: datetime) -> datetime | None:
 @click.option(
     "--since",
     "begin",
-    callback=_begin,
+    callback=time_typed,
     metavar="TIME",
     help="Start at: 2h, 30m, 7d, 08:30 or 2026-03-01T08:30.",
 )
+@click.option(
+    "--csv",
+    "csv_path",
+    type=click.Path(dir_okay=False, writable=True, path_type=Path),
+    metavar="FILE",
+    help="Write a CSV file, and print nothing but errors.",
+)
+@click.option("--force", is_flag=True, help="Replace a CSV file that exists.")
 @json_option
-def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
-    """Show writes to drives from this computer, trips that were seen, and timeout tests.
+def journal(
+    wanted: WantedDrive,
+    begin: datetime | None,
+    csv_path: Path | None,
+    force: bool,
+    as_json: bool,
+) -> None:
+    """Show writes to drives from this computer, trips, timeout tests, runs and lost links.
 
     Each write has its time, the drive, the old and new value, the drive's reply, and the reason.
-    The readable entries of a damaged journal are shown, too.
+    Runs and lost links are those that the record of a line shows: a run has its end, its reference,
+    and the program that began it. The readable entries of a damaged journal are shown, too.
     """
-    from tui.session.journal import Entry, Journal
-    from tui.session.journal_reading import DamagedLine, completed, read_journal, selected
+    from tui.session.changes import read_changes
+    from tui.session.journal import Journal
+    from tui.session.record.ring import record_folder
 
-    kept = Journal()
+    if force and csv_path is None:
+        raise click.UsageError("--force requires --csv FILE.")
+    path = Journal().path
     try:
-        lines = list(read_journal(kept.files))
+        lines = [wanted.line] if wanted.line else []
+        found = read_changes(record_folder(), device=wanted.device, lines=lines, since=begin)
     except OSError as error:
-        raise Failure(f"{kept.path} cannot be read: {error.strerror or error}.", USAGE) from error
-    entries = completed(line for line in lines if isinstance(line, Entry))
-    shown = selected(entries, device=wanted.device, line=wanted.line, since=begin)
-    damaged = [line for line in lines if isinstance(line, DamagedLine)]
+        raise Failure(f"{path} cannot be read: {error.strerror or error}.", USAGE) from error
+    if csv_path is not None:
+        _write_csv(csv_path, found, force=force)
     if as_json:
-        from ..documents.other_documents import (
-            DamagedLineField,
-            JournalDocument,
-            JournalEntryField,
-        )
+        from msgspec import convert
 
-        print_json(
-            JournalDocument(
-                journal=str(kept.path),
-                entries=[JournalEntryField(**asdict(entry)) for entry in shown],
-                damaged=[
-                    DamagedLineField(file=str(line.file), line=line.number, text=line.text)
-                    for line in damaged
-                ],
-            )
-        )
+        from tui.session.changes import changes_fields
+
+        from ..documents.journal_documents import JournalDocument
+
+        fields = {"journal": str(path), **changes_fields(found)}
+        print_json(convert(fields, JournalDocument))
         return
-    _say(shown, damaged, str(kept.path), filtered=len(shown) < len(entries))
-
-
-def _say(entries: list[Entry], damaged: list[DamagedLine], path: str, *, filtered: bool) -> None:
-    for entry in entries:
-        say(entry_line(entry))
-    if not entries:
-        say("No entry of the journal fits." if filtered else f"The journal is empty: {path}")
-    for line in damaged:
+    if csv_path is None:
+        _say(found, str(path))
+    for line in found.damaged:
         say(
             f"drivepanel: {line.file}, line {line.number} is not a valid entry"
             f" (cut off or damaged): {line.text[:60]}",
             err=True,
         )
+    for text in found.unread:
+        say(f"drivepanel: {text}", err=True)
 
 
-def entry_line(entry: Entry) -> str:
-    """One line about an entry: time, drive, old and new value, answer, reason."""
+def _say(found: ChangeList, path: str) -> None:
+    changes = found.in_order
+    for change in changes:
+        say(change_line(change))
+    if not changes:
+        say("No entry of the journal fits." if found.has_more else f"The journal is empty: {path}")
+
+
+def change_line(change: Change) -> str:
+    """One line about a change: time, drive, text."""
+    from tui.session.changes import change_text, device_of, time_of_change
+
+    when = time_of_change(change)
+    # an entry that is damaged has no valid time
+    reported = f"{when:%Y-%m-%d %H:%M:%S}" if when is not None else getattr(change, "time", "")
+    device = device_of(change)
+    place = "line" if device is None else device
+    return f"{reported}  {place}/{change.line}  {change_text(change)}"
+
+
+def _write_csv(path: Path, found: ChangeList, *, force: bool) -> None:
+    """Write all changes as rows, oldest first. Raises Failure."""
+    from ..shared.csv_files import CsvFile
+
+    file = CsvFile(path, [column.title for column in CHANGE_COLUMNS], force=force)
+    try:
+        for change in found.in_order:
+            file.write(_cells(change))
+    finally:
+        file.close()
+
+
+def _cells(change: Change) -> list[str]:
+    """The cells of a change, in the order of `CHANGE_COLUMNS`."""
+    from tui.session.changes import LineLoss, LineRun, local_time
+
+    match change:
+        case LineRun(line, run):
+            seen = [run.reference, *((f"{run.least} to {run.most}",) if run.least else ())]
+            return [
+                *_times(local_time(run.begun)), "run", line, str(run.device), run.profile, "", "",
+                run.direction, *_times(local_time(run.ended)), ", ".join(seen), "", run.who,
+                "" if run.end_within is not None else "still running",
+            ]  # fmt: skip
+        case LineLoss(line, loss):
+            ended = ("", "") if loss.ended is None else _times(local_time(loss.ended))
+            number = "" if loss.device is None else str(loss.device)
+            begun = _times(local_time(loss.begun))
+            return [*begun, "lost", line, number, "", "", "", "", *ended, "", "", "", loss.reason]
+        case _:
+            return _entry_cells(change)
+
+
+def _entry_cells(entry: Entry) -> list[str]:
     from tui.session.journal_reading import time_of
 
     when = time_of(entry)
-    reported = f"{when:%Y-%m-%d %H:%M:%S}" if when is not None else entry.time
-    head = f"{reported}  {entry.device}/{entry.line}"
-    if entry.kind == "fault":
-        return f"{head}  FAULT {entry.code} {entry.new}: {entry.answer}"
-    if entry.kind == "proof":
-        return f"{head}  {entry.why}: {entry.new}  {entry.answer}"
-    if entry.kind == "reset":
-        return f"{head}  {entry.code}: {entry.why} set to {entry.new}  {entry.answer}"
-    if entry.kind == "read-back":
-        return f"{head}  {entry.code}: {entry.answer}"
-    change = f"{entry.old} -> {entry.new}" if entry.old else f"-> {entry.new}"
-    return f"{head}  {entry.code}: {change}  {entry.answer}  ({entry.why})"
+    return [
+        *(_times(when) if when is not None else (entry.time, "")), entry.kind, entry.line,
+        str(entry.device), entry.profile, entry.code, entry.old, entry.new, "", "", "",
+        entry.answer, "", entry.why,
+    ]  # fmt: skip
+
+
+def _times(when: datetime) -> tuple[str, str]:
+    """A time in UTC and in the local zone, as RFC 3339 has them."""
+    local = when.astimezone().isoformat(timespec="milliseconds")
+    return when.astimezone(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z"), local

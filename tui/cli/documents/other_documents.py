@@ -305,43 +305,6 @@ class BenchRefusedDocument(Document, kw_only=True):
     error: str
 
 
-class JournalEntryField(DocumentPart):
-    """A write, a trip that was seen, or a proof; `read_back` is what the drive held in the end."""
-
-    time: str
-    line: str
-    device: int
-    profile: str
-    code: str
-    address: int
-    old_raw: int | None
-    old: str
-    new_raw: int
-    new: str
-    answer: str
-    read_back: int | None
-    why: str
-    kind: Literal["write", "fault", "read-back", "proof", "reset"]
-    of: str
-
-
-class DamagedLineField(DocumentPart):
-    """A damaged line of the journal, with its beginning."""
-
-    file: str
-    line: int
-    text: str
-
-
-class JournalDocument(Document, kw_only=True):
-    """`journal`: what was written to drives from here, oldest first."""
-
-    command: Literal["journal"] = "journal"
-    journal: str
-    entries: list[JournalEntryField]
-    damaged: list[DamagedLineField]
-
-
 class BundleDocument(Document, kw_only=True):
     """`bundle`: the file, what is in it, and why other files are not."""
 

@@ -20,11 +20,12 @@ from tui.bus.transport.ports import list_ports, see_port
 from tui.drive.profile import library
 from tui.drive.small_file import open_regular, read_small_text
 
+from ..changes import changes_fields, read_changes
 from ..connect.known_lines import line_name, load_memory
 from ..connect.share_place import owners
-from ..journal import Entry, Journal
-from ..journal_reading import DamagedLine, completed, read_journal, selected
+from ..journal import Journal
 from ..logs import log_file
+from ..record.ring import record_folder
 from .parts import Missing, Part, PartFile, in_own_thread
 from .redaction import PASSWORD_VARIABLE
 from .subject import BundleSubject
@@ -54,8 +55,8 @@ def record_parts(subject: BundleSubject) -> Iterator[Part]:
     """Yield the records of this computer; the profiles, once the drives are known."""
     yield Part(
         "journal.json",
-        "The journal of this line for the last day: writes, trips, tests. The form is that of"
-        " `drivepanel journal --json`.",
+        "The journal of this line for the last day: writes, trips, tests, runs, lost links. The"
+        " form is that of `drivepanel journal --json`.",
         lambda: in_own_thread(partial(_journal_file, subject)),
     )
     yield Part(
@@ -163,26 +164,14 @@ def _versions_file() -> PartFile:
 
 
 def _journal_file(subject: BundleSubject) -> PartFile:
-    kept = Journal()
-    lines = list(read_journal(kept.files))
-    entries = completed(line for line in lines if isinstance(line, Entry))
     texts = {subject.text} | ({label(subject.link)} if subject.link is not None else set())
-    found = {
-        id(entry): entry
-        for text in sorted(texts)
-        for entry in selected(entries, line=text, since=subject.since)
-    }
+    found = read_changes(record_folder(), lines=sorted(texts), since=subject.since)
     return PartFile(
         {
             "schema": JSON_SCHEMA_OF_JOURNAL,
             "command": "journal",
-            "journal": str(kept.path),
-            "entries": [asdict(entry) for entry in entries if id(entry) in found],
-            "damaged": [
-                {"file": str(line.file), "line": line.number, "text": line.text}
-                for line in lines
-                if isinstance(line, DamagedLine)
-            ],
+            "journal": str(Journal().path),
+            **changes_fields(found),
         }
     )
 

@@ -103,6 +103,12 @@ class RecordReader:
         """Close the file."""
         self._base.close()
 
+    @property
+    def line(self) -> str:
+        """The line as text, with its settings when the file was created."""
+        found = self._base.execute("SELECT value FROM about WHERE name = 'line'").fetchone()
+        return str(found[0]) if found else ""
+
     def words(
         self, device: int, register: int, since: int, until: int, *, function: int = 3
     ) -> Iterator[RecordedWord]:
@@ -195,6 +201,16 @@ class RecordReader:
             if len(rows) < ROWS_AT_A_TIME:
                 return
             last = rows[-1][:2]
+
+    def last_writer(self, device: int, register: int, since: int, until: int) -> str:
+        """Return the program whose write of a register was the last one that the drive took."""
+        found = self._base.execute(
+            "SELECT who.name FROM reply JOIN who ON who.id = reply.who WHERE device = ?"
+            " AND utc >= ? AND utc < ? AND function IN (6, 16) AND quality = ? AND address <= ?"
+            " AND address + registers > ? ORDER BY utc DESC, reply.id DESC LIMIT 1",
+            (device, since, until, GOOD, register, register),
+        ).fetchone()
+        return str(found[0]) if found else ""
 
     def events(self, since: int, until: int) -> list[EventRow]:
         """Return the events of a time, in their order."""

@@ -1,0 +1,328 @@
+"""Changes on the lines of this computer: writes and trips of the journal, runs, lost links.
+
+Writes, trips and tests come from the journal, runs and lost links from the record of each line.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from datetime import UTC, datetime, time, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .connect.line_key import line_key
+from .journal import Entry, Journal, entry_time
+from .journal_reading import DamagedLine, completed, read_journal, selected, time_of
+from .record.ring import RECORD_SUFFIX, SECONDS_A_DAY, day_of_record
+
+if TYPE_CHECKING:
+    from .record.runs import LostLink, RecordedRun
+    from .report import Trip
+
+_SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
+_AGO = re.compile(r"(\d{1,9})\s*([smhdw])")
+TIME_EXAMPLES = "2h, 30m, 7d, 08:30, 2026-03-01, 2026-03-01T08:30"
+RUN_SEARCHED = 86400.0
+"""Seconds before the wanted time in which the begin of a run is searched."""
+_END_OF_TIME = 4e9
+"""A time after all records, in seconds since 1970."""
+_EXACT = 1.0
+"""Seconds up to which the times of a run count as exact."""
+
+
+class LineRun(NamedTuple):
+    """A run of a drive, with the line as its record names it."""
+
+    line: str
+    run: RecordedRun
+
+
+class LineLoss(NamedTuple):
+    """A lost link, with the line as its record names it."""
+
+    line: str
+    loss: LostLink
+
+
+class DriveTrip(NamedTuple):
+    """A trip of a drive, with the line as it was typed."""
+
+    line: str
+    device: int
+    trip: Trip
+
+
+Change = Entry | LineRun | LineLoss
+
+
+@dataclass(slots=True)
+class ChangeList:
+    """Changes on the lines, each part oldest first."""
+
+    entries: list[Entry] = field(default_factory=list)
+    runs: list[LineRun] = field(default_factory=list)
+    losses: list[LineLoss] = field(default_factory=list)
+    damaged: list[DamagedLine] = field(default_factory=list)
+    unread: list[str] = field(default_factory=list)
+    """Why records could not be read, with their files."""
+    has_more: bool = False
+    """True if the journal has entries that were not selected."""
+
+    @property
+    def in_order(self) -> list[Change]:
+        """All of them, oldest first. An entry without a valid time comes after the one before."""
+        last = datetime.min.replace(tzinfo=UTC)
+        found: list[tuple[datetime, Change]] = []
+        changes: list[Change] = [*self.entries, *self.runs, *self.losses]
+        for change in changes:
+            last = time_of_change(change) or last
+            found.append((last, change))
+        return [change for _, change in sorted(found, key=lambda pair: pair[0])]
+
+    @property
+    def trips(self) -> Iterator[DriveTrip]:
+        """The trips of the entries, those of one drive after the other."""
+        from .report import trips_of
+
+        faults = [entry for entry in self.entries if entry.kind == "fault"]
+        for line, device in dict.fromkeys((entry.line, entry.device) for entry in faults):
+            own = [entry for entry in faults if (entry.line, entry.device) == (line, device)]
+            yield from (DriveTrip(line, device, trip) for trip in trips_of(own))
+
+
+def parse_since(text: str, now: datetime) -> datetime | None:
+    """Return the time that a text names; None if it names none. A time of day is the last one."""
+    text = text.strip()
+    try:
+        if ago := _AGO.fullmatch(text):
+            return now - timedelta(seconds=int(ago[1]) * _SECONDS[ago[2]])
+        if re.fullmatch(r"\d\d?:\d\d(:\d\d)?", text):
+            clock_time = time.fromisoformat(
+                text.rjust(5, "0") if len(text) < 6 else text.rjust(8, "0")
+            )
+            then = datetime.combine(now.date(), clock_time).astimezone()
+            return then if then <= now else then - timedelta(days=1)
+        return datetime.fromisoformat(text).astimezone()
+    except (ValueError, OverflowError, OSError):
+        return None
+
+
+def read_changes(
+    folder: Path,
+    *,
+    device: int | None = None,
+    lines: Sequence[str] = (),
+    since: datetime | None = None,
+) -> ChangeList:
+    """Read the changes from the journal and from the records in a folder.
+
+    `lines` selects lines by one of their spellings; without any, all are read. It takes
+    some seconds for a full record. Raises OSError for a journal that cannot be read.
+    """
+    kept = list(read_journal(Journal().files))
+    entries = completed(item for item in kept if isinstance(item, Entry))
+    shown = selected(entries, device=device, lines=lines, since=since)
+    found = ChangeList(entries=shown, has_more=len(shown) < len(entries))
+    found.damaged = [item for item in kept if isinstance(item, DamagedLine)]
+    keys = {line_key(line) for line in lines}
+    begin = 0.0 if since is None else since.timestamp()
+    for paths in _files_by_line(folder, begin - RUN_SEARCHED):
+        _add_record(found, paths, device, keys, begin)
+    found.runs.sort(key=lambda item: item.run.begun)
+    found.losses.sort(key=lambda item: item.loss.begun)
+    return found
+
+
+def _files_by_line(folder: Path, begin: float) -> Iterator[list[Path]]:
+    """Yield the files of each line from a time on, the oldest first."""
+    by_line: dict[str, list[Path]] = {}
+    for path in sorted(folder.glob(f"*{RECORD_SUFFIX}")):
+        day = day_of_record(path)
+        if day is not None and day >= begin // SECONDS_A_DAY:
+            by_line.setdefault(path.name.partition("_")[2], []).append(path)
+    yield from by_line.values()
+
+
+def _add_record(
+    found: ChangeList,
+    paths: Sequence[Path],
+    device: int | None,
+    keys: Collection[str],
+    begin: float,
+) -> None:
+    """Add the runs and lost links in the files of one line."""
+    from .record.runs import lost_lines, read_events, runs_of
+
+    record = read_events(paths)
+    found.unread += record.unread
+    if not record.files or (keys and line_key(record.line) not in keys):
+        return
+    line_losses = list(lost_lines(record))
+    losses, runs = list(line_losses), []
+    for each, profile in sorted(record.profiles.items()):
+        if device in (None, each):
+            since = max(0.0, begin - RUN_SEARCHED)
+            own, silent = runs_of(record, each, profile, since, _END_OF_TIME)
+            runs += own
+            losses += [loss for loss in silent if not _is_within(loss, line_losses)]
+    found.runs += [LineRun(record.line, run) for run in runs if run.ended >= begin]
+    found.losses += [
+        LineLoss(record.line, loss) for loss in losses if loss.ended is None or loss.ended >= begin
+    ]
+
+
+def _is_within(loss: LostLink, losses: Iterable[LostLink]) -> bool:
+    """Return True if the whole line was lost when a drive's link was."""
+    return any(
+        other.begun <= loss.begun <= (loss.begun if other.ended is None else other.ended)
+        for other in losses
+    )
+
+
+def time_of_change(change: Change) -> datetime | None:
+    """Return the local time of an entry, or the begin of a run or loss; None for an invalid one."""
+    match change:
+        case LineRun(run=run):
+            return local_time(run.begun)
+        case LineLoss(loss=loss):
+            return local_time(loss.begun)
+        case _:
+            return time_of(change)
+
+
+def device_of(change: Change) -> int | None:
+    """Return the address of the drive; None for the whole line."""
+    match change:
+        case LineRun(run=run):
+            return run.device
+        case LineLoss(loss=loss):
+            return loss.device
+        case _:
+            return change.device
+
+
+# Fields of JSON, as `drivepanel journal --json` has them
+
+
+def changes_fields(changes: ChangeList) -> dict[str, Any]:
+    """Return the parts of changes as JSON has them; times are local, to the millisecond."""
+    return {
+        "entries": [asdict(entry) for entry in changes.entries],
+        "damaged": [
+            {"file": str(line.file), "line": line.number, "text": line.text}
+            for line in changes.damaged
+        ],
+        "trips": [_trip_fields(item) for item in changes.trips],
+        "runs": [_run_fields(item) for item in changes.runs],
+        "lost": [_loss_fields(item) for item in changes.losses],
+        "unread": changes.unread,
+    }
+
+
+def _trip_fields(found: DriveTrip) -> dict[str, Any]:
+    trip = found.trip
+    return {
+        "line": found.line,
+        "device": found.device,
+        "code": trip.code,
+        "name": trip.name,
+        "seen": trip.seen,
+        "tripped": trip.tripped or None,
+        "reset": trip.reset or None,
+    }
+
+
+def _run_fields(found: LineRun) -> dict[str, Any]:
+    run = found.run
+    return {
+        "line": found.line,
+        "device": run.device,
+        "profile": run.profile,
+        "begun": entry_time(run.begun),
+        "ended": entry_time(run.ended),
+        "begin_seen": run.begin_within is not None,
+        "end_seen": run.end_within is not None,
+        "within": round(max(run.begin_within or 0.0, run.end_within or 0.0), 3),
+        "direction": run.direction or None,
+        "reference": run.reference or None,
+        "least": run.least or None,
+        "most": run.most or None,
+        "who": run.who or None,
+    }
+
+
+def _loss_fields(found: LineLoss) -> dict[str, Any]:
+    loss = found.loss
+    return {
+        "line": found.line,
+        "device": loss.device,
+        "begun": entry_time(loss.begun),
+        "ended": None if loss.ended is None else entry_time(loss.ended),
+        "reason": loss.reason,
+    }
+
+
+# Texts
+
+
+def entry_text(entry: Entry) -> str:
+    """Return an entry without its time and drive: old and new value, answer, reason."""
+    match entry.kind:
+        case "fault":
+            return f"FAULT {entry.code} {entry.new}: {entry.answer}"
+        case "proof":
+            return f"{entry.why}: {entry.new}  {entry.answer}"
+        case "reset":
+            return f"{entry.code}: {entry.why} set to {entry.new}  {entry.answer}"
+        case "read-back":
+            return f"{entry.code}: {entry.answer}"
+        case _:
+            change = f"{entry.old} -> {entry.new}" if entry.old else f"-> {entry.new}"
+            return f"{entry.code}: {change}  {entry.answer}  ({entry.why})"
+
+
+def run_text(run: RecordedRun) -> str:
+    """Return a run without its begin and drive: direction, end, reference, program."""
+    begun, ended = local_time(run.begun), local_time(run.ended)
+    at = f"{ended:%H:%M:%S}" if ended.date() == begun.date() else f"{ended:%Y-%m-%d %H:%M:%S}"
+    parts = [f"RUN {run.direction}".rstrip()]
+    parts += [f"at {run.reference}"] if run.reference else []
+    parts += [f"({run.least} to {run.most})"] if run.least else []
+    seen = f"until {at}" if run.end_within is not None else f"last seen running at {at}"
+    parts.append(seen)
+    if run.who:
+        parts.append(f"by {run.who}")
+    elif run.begin_within is not None:
+        parts.append("by another source")
+    notes = [] if run.begin_within is not None else ["it ran when first read"]
+    within = max(run.begin_within or 0, run.end_within or 0)
+    notes += [f"times to {within:.0f} s"] if within > _EXACT else []
+    return " ".join(parts) + (f"  ({', '.join(notes)})" if notes else "")
+
+
+def loss_text(loss: LostLink) -> str:
+    """Return a lost link without its begin: its end, its length, the reason."""
+    what = "LINE LOST" if loss.device is None else "NO ANSWER"
+    reason = f": {loss.reason}" if loss.reason and loss.reason != "no reply" else ""
+    if loss.ended is None:
+        return f"{what} since then{reason}"
+    seconds = loss.ended - loss.begun
+    return f"{what} until {local_time(loss.ended):%H:%M:%S} ({seconds:.0f} s){reason}"
+
+
+def change_text(change: Change) -> str:
+    """Return a change without its time and its drive."""
+    match change:
+        case LineRun(run=run):
+            return run_text(run)
+        case LineLoss(loss=loss):
+            return loss_text(loss)
+        case _:
+            return entry_text(change)
+
+
+def local_time(seconds: float) -> datetime:
+    """Return a time of a record in the local zone."""
+    return datetime.fromtimestamp(seconds).astimezone()
