@@ -34,11 +34,11 @@ from tests.swapped import NotSwapped
 PACKAGES = ("bus", "keeper", "session", "drive", "cli", "screens")
 LEAST = 0.92
 """The share of defects that must be noticed; on the way of a stop, all."""
-MOST_TESTS = 40, 120
+MOST_TESTS = 40, 80
 """Tests that are run for one defect, and as many more if none of them fails."""
 MOST_ALIKE = 3
 """Tests of one function with other parameters that are run for one defect, if there are others."""
-MOST_SECONDS = 100.0, 200.0
+MOST_SECONDS = 60.0, 60.0
 """Time of these tests, as recorded."""
 FOLDERS = {"screens": "ui", "keeper": "session"}
 """By package: the folder of its tests, if it has another name."""

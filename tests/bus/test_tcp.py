@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import time
 from collections.abc import Callable, Sequence
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -14,6 +17,7 @@ from tui.bus.limits import CAUTIOUS
 from tui.bus.line import Timing
 from tui.bus.link import RtuTcpLink, TcpLink
 from tui.bus.prepared import prepared_write
+from tui.bus.transport import tcp as tcp_module
 from tui.bus.transport.tcp import TcpTransport
 
 from .conftest import BRISK, WIDE, OpenLine
@@ -219,3 +223,130 @@ async def test_reply_with_the_device_address_instead_of_the_unit_is_rejected(
         line = open_line(TcpLink("127.0.0.1", peer.port, unit=255))
         with pytest.raises(WrongReply, match="unit 1"):
             await line.read(1, 100)
+
+
+# -- a connection, step by step --------------------------------------------------------------------
+
+
+class Connected(asyncio.Transport):
+    """A connection that writes into a list."""
+
+    def __init__(self) -> None:
+        super().__init__({"socket": self})
+        self.written: list[bytes] = []
+        self.closing = self.aborted = False
+
+    def setsockopt(self, *option: int) -> None:
+        """Any option is accepted."""
+
+    def is_closing(self) -> bool:
+        return self.closing
+
+    def write(self, data: Any) -> None:
+        self.written.append(bytes(data))
+
+    def abort(self) -> None:
+        self.aborted = True
+
+
+class Heard:
+    """A receiver that keeps all it gets."""
+
+    def __init__(self) -> None:
+        self.got: list[object] = []
+
+    def received(self, data: bytes, at: float) -> None:
+        assert abs(time.monotonic() - at) < 60.0
+        self.got.append(data)
+
+    def lost(self, reason: str) -> None:
+        self.got.append(reason)
+
+
+async def test_frame_is_sent_on_an_open_connection_only() -> None:
+    transport, connection = TcpTransport(), Connected()
+    with pytest.raises(OSError, match="the connection is closed"):
+        await transport.send(b"never connected")
+    transport.connection_made(connection)
+    await transport.send(b"frame")
+    assert connection.written == [b"frame"]
+    connection.closing = True
+    with pytest.raises(OSError, match="the connection is closed"):
+        await transport.send(b"while it is closing")
+    connection.closing = False
+    transport.close()
+    assert connection.aborted
+    transport.close()
+    with pytest.raises(OSError, match="the connection is closed"):
+        await transport.send(b"after it was closed")
+    assert connection.written == [b"frame"]
+
+
+@pytest.mark.parametrize(
+    ("error", "reason"),
+    [
+        (None, "the other end closed"),
+        (OSError("no route"), "the connection was lost (no route)"),
+    ],
+)
+async def test_end_of_a_connection_is_reported_once_with_its_reason(
+    error: Exception | None, reason: str
+) -> None:
+    transport, heard = TcpTransport(), Heard()
+    transport.connection_made(Connected())
+    transport.start(heard)
+    transport.data_received(b"reply")
+    transport.connection_lost(error)
+    transport.connection_lost(error)
+    transport.data_received(b"of another")
+    assert heard.got == [b"reply", reason]
+    with pytest.raises(OSError, match="the connection is closed"):
+        await transport.send(b"frame")
+
+
+def test_what_came_before_the_start_is_passed_on_once() -> None:
+    transport, first, second = TcpTransport(), Heard(), Heard()
+    transport.connection_made(Connected())
+    transport.start(second)
+    assert second.got == []
+    transport = TcpTransport()
+    transport.data_received(b"ear")
+    transport.data_received(b"ly")
+    transport.start(first)
+    transport.start(second)
+    transport.data_received(b"later")
+    assert (first.got, second.got) == ([b"early"], [b"later"])
+    ended = TcpTransport()
+    ended.data_received(b"a")
+    ended.connection_lost(None)
+    ended.start(first)
+    ended.data_received(b"b")
+    assert first.got == [b"early", b"a", "the other end closed"]
+
+
+def test_closed_connection_reports_nothing_more() -> None:
+    transport, heard = TcpTransport(), Heard()
+    transport.connection_made(Connected())
+    transport.start(heard)
+    transport.close()
+    transport.data_received(b"late")
+    transport.connection_lost(None)
+    assert heard.got == []
+
+
+async def test_rest_lasts_until_its_time_and_not_for_a_time_that_has_passed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    slept: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        slept.append(seconds)
+
+    monkeypatch.setattr(tcp_module, "time", SimpleNamespace(monotonic=lambda: 10.0))
+    monkeypatch.setattr(tcp_module, "asyncio", SimpleNamespace(sleep=sleep))
+    transport = TcpTransport()
+    for until in (9.0, 10.0, 10.25):
+        await transport.rest(until)
+    assert slept == [0.25]
+    await transport.take_in()
+    assert slept == [0.25, 0, 0], "two turns of the loop"

@@ -6,13 +6,15 @@ import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import product
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from tests.sent import words_written
 from tests.sweeps import kept
 from tui.bus.api import Priority
-from tui.bus.errors import BytesSwapped
+from tui.bus.errors import BytesSwapped, NoAnswer
 from tui.bus.line import Line
 from tui.bus.link import Link, RtuTcpLink, SerialLink, TcpLink
 from tui.drive.byte_order import only_swapped, swapped_word, telling_codes
@@ -25,6 +27,7 @@ from tui.session.command.stop_report import Phase
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.monitor.monitor import Monitor
+from tui.session.read import order_check
 from tui.session.read.order_check import check_byte_order
 from tui.session.read.reader import Reader
 from tui.session.read.retrying_reader import RetryingReader
@@ -271,3 +274,46 @@ async def test_three_odd_words_of_a_healthy_drive_are_tolerated() -> None:
         await check(session)
         assert sum(swapped for swapped, _ in session.byte_order._seen.values()) == 3
         assert not session.byte_order.text
+
+
+@pytest.mark.parametrize(
+    ("doubtful", "error", "silent_family", "tested", "looked", "raised"),
+    [
+        (True, None, True, True, False, False),
+        (False, None, True, False, False, False),
+        (True, NoAnswer(1, 3, 1), True, True, True, False),
+        (True, NoAnswer(1, 3, 1), False, False, False, True),
+        (True, NoAnswer(1, 3, 1, retry_in=2.0), True, False, False, True),
+        (True, TimeoutError(), True, False, False, False),
+    ],
+)
+async def test_check_of_the_byte_order_reads_at_the_priority_of_its_caller(
+    doubtful: bool, error: Exception | None, silent_family: bool, tested: bool, looked: bool,
+    raised: bool, monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    noted: list[object] = []
+    order = SimpleNamespace(is_doubtful=doubtful, note_tested=lambda: noted.append("tested"))
+    profile = library.load("atv71")
+    session = SimpleNamespace(byte_order=order, profile=profile)
+
+    async def read(codes: object, **how: object) -> None:
+        noted.append((codes, how))
+        if error is not None:
+            raise error
+
+    async def look(*those: object) -> None:
+        assert those == (session, error)
+        noted.append("looked")
+
+    monkeypatch.setattr(order_check, "meets_silence", lambda _: silent_family)
+    monkeypatch.setattr(order_check, "look_for_drive", look)
+    reader = cast(Any, SimpleNamespace(session=session, read=read))
+    for priority in (Priority.STOP, Priority.OPERATOR_READ):
+        noted.clear()
+        if raised:
+            with pytest.raises(NoAnswer):
+                await check_byte_order(reader, priority)
+        else:
+            await check_byte_order(reader, priority)
+        expected: list[object] = [(telling_codes(profile), {"priority": priority})] * doubtful
+        assert noted == [*expected, *["looked"] * looked, *["tested"] * tested]

@@ -164,6 +164,18 @@ def test_stop_that_began_has_the_time_of_the_reads_before_it(
     assert found == [(1.35, "directly", 1, 2), (7.65, 1, 7.0, LATE), (7.65, 2, 7.0, LATE)]
 
 
+def test_limits_of_the_watch_are_exceeded_at_a_later_moment_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    exact = {"STANDSTILL_POLL_INTERVAL": 0.25, "HANGS_AFTER": 0.75, "FIRST_FRAME_EACH": 0.25}
+    for name, seconds in exact.items():  # each moment is then exact, too
+        monkeypatch.setattr(under_way, name, seconds)
+    here = Watched(monkeypatch)
+    assert here.watch(here.work(1)) == [(1.0, "directly", 1), (1.25, 1, 7.0, LATE)]
+    here = Watched(monkeypatch)
+    assert here.watch(here.work(1, begun=True)) == [(2.25, "directly", 1), (7.5, 1, 7.0, LATE)]
+
+
 def test_stop_whose_work_ended_unsent_is_sent_immediately(monkeypatch: pytest.MonkeyPatch) -> None:
     here = Watched(monkeypatch)
     assert here.watch(here.work(1, begun=True, done=True)) == [(0.15, 1, 7.0, LATE)]

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from decimal import Decimal
+from typing import Any
 
 import pytest
 
-from tui.bus.api import Priority
+from tui.bus.api import Priority, Reply
 from tui.bus.errors import NoAnswer
 from tui.session.drive import DriveSession
 from tui.session.read.kept_plans import PLANS_KEPT
@@ -154,6 +155,34 @@ async def test_unanswered_read_is_an_error_not_a_value() -> None:
     line.silence(1)
     with pytest.raises(NoAnswer):
         await Reader(DriveSession(line, 1, profile_of(parameter("P1", 1)))).read(["P1"])
+
+
+class Asked(OneDrive):
+    """A drive that notes how each read is requested."""
+
+    def __init__(self, registers: dict[int, int]) -> None:
+        super().__init__(registers)
+        self.how: list[dict[str, Any]] = []
+
+    async def read(self, device: int, address: int, count: int = 1, **how: Any) -> Reply:
+        self.how.append(how)
+        return await super().read(device, address, count, **how)
+
+
+@pytest.mark.parametrize("priority", [*Priority])
+async def test_read_has_the_priority_of_its_caller_and_the_function_of_its_words(
+    priority: Priority,
+) -> None:
+    line = Asked({1: 1, 2: 2, 9: 9})
+    words = (parameter("P1", 1), parameter("P2", 2), parameter("P9", 9, function=4))
+    functions = [{"code": code, "name": "Read", "max_read": 20} for code in (3, 4)]
+    reader = Reader(DriveSession(line, 1, profile_of(*words, functions=functions)))
+    reader.max_age = 5.0
+    await reader.read(["P1", "P2", "P9"], priority=priority)
+    assert {how["priority"] for how in line.how} == {priority}
+    assert sorted(how["function"] for how in line.how) == [3, 4]
+    # only a poll may be answered by a value that another program has read
+    assert {how["max_age"] > 0 for how in line.how} == {priority >= Priority.POLL}
 
 
 def test_line_gets_the_limits_of_the_profile() -> None:

@@ -19,6 +19,7 @@ from tui.drive.orders import OrderRefused
 from tui.session.arming import Arming, CommandedElsewhere, NotArmed
 from tui.session.work import (
     BY_STOP,
+    DROPPED_BY_STOP,
     MOST_WAITING,
     STOPPED_DISARMS,
     Outcome,
@@ -179,6 +180,24 @@ async def test_stop_ends_the_current_task_and_the_queue(reported: Notified) -> N
     assert reported.queue.outcome.text == BY_STOP
     assert isinstance(reported.queue.outcome.error, Stopped)
     assert (reported.queue.stops, reported.queue.stopped_by) == (1, "F12")
+
+
+async def test_stop_reports_tasks_that_had_not_begun_and_nothing_else(reported: Notified) -> None:
+    reported.queue.stop("F12")
+    assert reported.queue.outcome is None, "nothing was dropped"
+    reported.arming.arm()
+    reported.put("a")
+    reported.queue.stop("F9")  # before the loop could begin
+    assert reported.outcome() == (OutcomeKind.REFUSED, DROPPED_BY_STOP)
+    assert reported.queue.outcome is not None
+    assert isinstance(reported.queue.outcome.error, Stopped)
+    assert "F9" in str(reported.queue.outcome.error)
+    assert not reported.queue.drop("a test")
+    reported.arming.arm()
+    reported.put("b")
+    assert reported.queue.drop("a test")
+    assert reported.outcome() == (OutcomeKind.REFUSED, "Not done: a test.")
+    assert await reported.idle() == ["a given up", "b given up"]
 
 
 async def test_stop_disarms_with_a_message(reported: Notified) -> None:
