@@ -34,7 +34,7 @@ from tests.swapped import NotSwapped
 PACKAGES = ("bus", "keeper", "session", "drive", "cli", "screens")
 LEAST = 0.92
 """The share of defects that must be noticed; on the way of a stop, all."""
-MOST_TESTS = 40, 80
+MOST_TESTS = 60, 80
 """Tests that are run for one defect, and as many more if none of them fails."""
 MOST_ALIKE = 3
 """Tests of one function with other parameters that are run for one defect, if there are others."""
@@ -190,7 +190,7 @@ class Chooser:
 
     def tests(self, mutant: Mutant) -> list[list[str]]:
         """The tests to run, those most about the changed line first, and those to run then."""
-        first, then = self._best(self._reaching(mutant) & self._usable, mutant.path)
+        first, then = self._best(self._reaching(mutant) & self._usable, mutant)
         for pattern, others in NOT_RECORDED.items():
             if fnmatch(mutant.path, pattern):
                 first += others
@@ -222,19 +222,24 @@ class Chooser:
         found = set().union(*(self._record.lines(path).get(line, set()) for path, line in used))
         return found if found or mutant.lines else set().union(*lines.values())
 
-    def _best(self, found: set[str], path: str) -> list[list[str]]:
+    def _best(self, found: set[str], mutant: Mutant) -> list[list[str]]:
         """First those of files that name the module, then of its package, and others.
 
-        Of each of them those that reach the fewest lines.
+        Of each of them those that share most names with the changed line, or reach few lines.
         """
         few_lines = sorted(found, key=lambda name: (self._record.tests[name].lines, name))
+        path = mutant.path
+        words = _names_in(_text(path).splitlines()[mutant.line - 1])
+        words.add(mutant.function.rpartition(".")[2])
+        alike = sorted(few_lines, key=lambda name: -len(words & _names_of(name)))
         module = path.removesuffix(".py").replace("/", ".")
         package = path.split("/")[1]
         folder = f"tests/{FOLDERS.get(package, package)}/"
-        near = [name for name in few_lines if module in _text(name.partition("::")[0])]
+        near = [name for name in alike if module in _text(name.partition("::")[0])]
         beside = [name for name in few_lines if name.startswith(folder)]
         most = MOST_TESTS[0]
-        first = [*_varied(near)[: most // 2], *_varied(beside)[: most // 4], *_varied(few_lines)]
+        first = [*_varied(near)[: most // 2], *_varied(alike)[: most // 4]]
+        first += [*_varied(beside)[: most // 8], *_varied(few_lines)]
         first = list(dict.fromkeys(first))[:most]
         left = list(dict.fromkeys((*first, *self._different(few_lines, path), *_spread(few_lines))))
         parts = []
@@ -283,6 +288,22 @@ def _varied(names: Iterable[str]) -> list[str]:
         count[function] += 1
         (first if count[function] <= MOST_ALIKE else last).append(name)
     return first + last
+
+
+def _names_in(text: str) -> set[str]:
+    return set(re.findall(r"[A-Za-z_]{4,}", text))
+
+
+@cache
+def _names_by_function(file: str) -> dict[str, set[str]]:
+    """By each test function of a file: the names in its source."""
+    pieces = re.split(r"^(?:async )?def (\w+)", _text(file), flags=re.MULTILINE)
+    return {name: _names_in(body) for name, body in zip(pieces[1::2], pieces[2::2], strict=True)}
+
+
+def _names_of(test: str) -> set[str]:
+    file, _, function = test.partition("[")[0].partition("::")
+    return _names_by_function(file).get(function, set())
 
 
 @cache
