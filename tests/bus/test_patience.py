@@ -346,8 +346,6 @@ def test_state_of_a_device_is_taken_over_from_the_owner_of_the_line() -> None:
     assert here._repeated == here[1].repeated == 10.0
     for within in (0.0, SHORT_WAIT, 0.5):  # one device's own
         slow = devices()
-        slow.copy(
-            1, owner.state(1).__class__(None, 0, None, None, None, None, None, 0.0, within, False)
-        )
+        slow.copy(1, replace(owner.state(1), copies_within=within))
         assert (slow._settle, slow._repeated) == (0.0, 0.0)
         assert slow[1].settle == within
