@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from tests.line_events import on_event
 from tui.bus.line_events import NoteReceived
-from tui.bus.notes import MOST_NOTE, MOST_NOTES, NOTES_KEPT, LineNote, Notes
+from tui.bus.notes import MOST_NOTE, MOST_NOTES, NOTE_COSTS, NOTES_KEPT, LineNote, Notes
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest
@@ -54,6 +54,22 @@ def test_oldest_notes_are_dropped_for_new_ones() -> None:
     assert sum(len(note.data) for note in kept) <= MOST_NOTES
     assert len(kept) > 100
     assert kept[-1].data.startswith((2 * MOST_NOTES // MOST_NOTE - 1).to_bytes(4, "big"))
+
+
+def test_notes_are_kept_up_to_their_total_size_with_what_each_costs() -> None:
+    bench = Bench()
+    count = MOST_NOTES // (MOST_NOTE + NOTE_COSTS)
+    assert count * (MOST_NOTE + NOTE_COSTS) < MOST_NOTES < (count + 1) * (MOST_NOTE + NOTE_COSTS)
+    rest = MOST_NOTES - count * (MOST_NOTE + NOTE_COSTS) - NOTE_COSTS
+    notes = [LineNote(1, f"{number}", bytes(MOST_NOTE)) for number in range(count)]
+    for note in (*notes, LineNote(1, "rest", bytes(rest))):
+        bench.notes.keep(note)
+    assert len(bench.notes.all) == count + 1, "they fill it to the last byte"
+    bench.notes.keep(LineNote(2, "one more"))
+    assert bench.notes.all[0] == notes[1]
+    assert len(bench.notes.all) == count + 1
+    bench.notes.keep(LineNote(2, "and one more"))
+    assert bench.notes.all[0] == notes[1], "the oldest one left room for several"
 
 
 async def test_program_gets_notes_of_a_program_that_has_closed(share: Share) -> None:

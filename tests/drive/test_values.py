@@ -17,6 +17,7 @@ from tui.drive.values import (
     decimals_of,
     decode,
     encode,
+    engineering,
     from_words,
     is_enumeration,
     percent_of,
@@ -359,3 +360,51 @@ def test_refusal_names_the_first_four_names() -> None:
 )
 def test_percentage_has_the_decimals_of_its_rating(percent: str, rating: str, value: str) -> None:
     assert str(percent_of(Decimal(percent), Decimal(rating))) == value
+
+
+@pytest.mark.parametrize(
+    ("scale", "decimals", "raw", "shown"),
+    [
+        ("1", 0, 5, "5"), ("0.1", 1, 5, "0.5"), ("0.25", 2, 3, "0.75"), ("10", 0, 5, "50"),
+        ("0.0018310546875", 3, 10, "0.018"), ("0.0018310546875", 3, 3, "0.005"),
+        ("0.0125", 2, 2, "0.03"), ("1.23456789", 0, 2, "2"), ("0.005", 3, 1, "0.005"),
+    ],
+)  # fmt: skip
+def test_value_has_the_decimals_of_its_scale_or_those_that_tell_two_counts_apart(
+    scale: str, decimals: int, raw: int, shown: str
+) -> None:
+    assert decimals_of(Decimal(scale)) == decimals
+    assert f"{engineering(raw, Decimal(scale)):f}" == shown
+
+
+@pytest.mark.parametrize(
+    ("least", "most", "expected"),
+    [(None, None, (0, 65535)), (0, None, (0, 65535)), (5, 9, (5, 9)), (None, 0, (0, 0))],
+)
+def test_raw_range_is_that_of_the_profile_within_the_type(
+    least: int | None, most: int | None, expected: tuple[int, int]
+) -> None:
+    assert raw_range(parameter(min=least, max=most)) == expected
+
+
+@pytest.mark.parametrize(
+    ("values", "least", "most", "enumeration"),
+    [
+        ({"0": "No", "1": "Yes"}, 0, 1, True), ({"0": "No", "1": "Yes"}, 0, 7, True),
+        ({"0": "No", "1": "Yes"}, 0, 8, False), ({"0": "No", "1": "Yes"}, None, 8, True),
+        ({"0": "No", "1": "Yes"}, 0, None, True), ({}, 0, 1, False),
+    ],
+)  # fmt: skip
+def test_value_is_a_number_if_its_range_exceeds_its_names_by_far(
+    values: dict[str, str], least: int | None, most: int | None, enumeration: bool
+) -> None:
+    assert is_enumeration(parameter(values=values, min=least, max=most)) is enumeration
+    assert not is_enumeration(parameter(values=values, min=least, max=most, unit="A"))
+    assert not is_enumeration(parameter(values=values, min=least, max=most, scale="0.1"))
+
+
+@pytest.mark.parametrize(("raw", "unsure"), [(99, False), (100, False), (101, True)])
+def test_value_above_what_is_verified_has_a_question_mark(raw: int, unsure: bool) -> None:
+    value = decode(parameter(sure_up_to=100, unit="A", scale="0.1"), raw, {}, Decimal("0.1"))
+    assert (value.text, value.unsure) == (f"{raw / 10:.1f}{'?' if unsure else ''}", unsure)
+    assert value.unit == "A"

@@ -21,6 +21,8 @@ from tui.drive.byte_order import only_swapped, swapped_word, telling_codes
 from tui.drive.orders import OrderRefused, chart_in_force, stop_in_any
 from tui.drive.profile import library
 from tui.drive.values import is_enumeration, is_field, raw_range, to_words, word_count
+from tui.session import byte_order as byte_orders
+from tui.session.byte_order import ByteOrder
 from tui.session.command.access import CommandAccess, CommandHistory
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
@@ -317,3 +319,115 @@ async def test_check_of_the_byte_order_reads_at_the_priority_of_its_caller(
             await check_byte_order(reader, priority)
         expected: list[object] = [(telling_codes(profile), {"priority": priority})] * doubtful
         assert noted == [*expected, *["looked"] * looked, *["tested"] * tested]
+
+
+class Votes:
+    """Values that indicate an order of their bytes, or nothing."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.order = ByteOrder(7)
+        self.heard: list[str] = []
+        self.order.on_swapped = self.heard.append
+        self.profile = cast(Any, object())
+        monkeypatch.setattr(byte_orders, "only_swapped", self._vote)
+
+    def _vote(self, profile: object, parameter: object, raw: int) -> bool | None:
+        assert profile is self.profile
+        return {0: False, 1: True}.get(raw)
+
+    def note(self, now: float, **raws: int | None) -> None:
+        found = {
+            code: SimpleNamespace(raw=raw, parameter=code, time=now) for code, raw in raws.items()
+        }
+        self.order.note(self.profile, cast(Any, found), now)
+
+    @property
+    def codes(self) -> tuple[str, ...]:
+        return self.order._against
+
+
+def test_three_values_that_fit_swapped_only_decide_and_are_reported_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Votes(monkeypatch)
+    here.note(1.0, B=1, A=1, X=None, Y=2)
+    assert (here.codes, here.heard, here.order.is_suspect) == ((), [], True)
+    assert here.order.error is None
+    assert here.order.text == ""
+    here.note(2.0, C=1)
+    assert here.codes == ("A", "B", "C")
+    assert here.heard == [here.order.text]
+    assert "7" in here.order.text
+    assert isinstance(here.order.error, BytesSwapped)
+    here.note(3.0, D=1)
+    assert len(here.heard) == 1
+    assert here.codes == ("A", "B", "C")
+
+
+@pytest.mark.parametrize(("right", "swapped"), [(0, True), (1, False)])
+def test_values_for_one_order_outnumber_those_for_the_other_by_four(
+    right: int, swapped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Votes(monkeypatch)
+    here.note(1.0, **{f"R{n}": 0 for n in range(right)})
+    here.note(2.0, **{f"W{n}": 1 for n in range(2)})
+    here.note(3.0, V=1)
+    assert bool(here.codes) is swapped
+    here.note(4.0, U=1)
+    assert here.codes, "four to one"
+
+
+@pytest.mark.parametrize(("right", "cleared"), [(2, False), (3, True)])
+def test_three_values_in_the_right_order_read_together_clear_the_others(
+    right: int, cleared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Votes(monkeypatch)
+    here.note(1.0, A=1, B=1, C=1)
+    here.note(2.0, **{f"R{n}": 0 for n in range(right)})
+    assert bool(here.codes) is not cleared
+    assert here.order.is_suspect is not cleared
+    here.note(3.0, **{f"R{n}": 0 for n in range(11)}, A=1, B=1, C=1)
+    assert bool(here.codes) is not cleared, "11 to 3 is no clear majority"
+    here.note(4.0, **{f"R{n}": 0 for n in range(12)}, A=1, B=1, C=1)
+    assert not here.codes
+
+
+def test_three_swapped_values_read_together_override_earlier_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Votes(monkeypatch)
+    here.note(1.0, **{f"R{n}": 0 for n in range(8)})
+    here.note(2.0, A=1, B=1)
+    assert not here.codes
+    here.note(3.0, A=1, B=1, C=1)
+    assert here.codes == ("A", "B", "C")
+
+
+def test_value_counts_for_ninety_seconds_and_its_latest_vote_only(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    for wait, swapped in ((90.0, True), (90.5, False)):
+        here = Votes(monkeypatch)
+        here.note(1.0, A=1, B=1)
+        here.note(1.0 + wait, C=1)
+        assert bool(here.codes) is swapped
+    here = Votes(monkeypatch)
+    here.note(1.0, A=1, B=1)
+    here.note(2.0, A=0)
+    here.note(3.0, C=1)
+    assert not here.codes
+    here.note(4.0, A=2, B=2, C=2)
+    assert not here.order.is_suspect, "they say nothing any more"
+
+
+def test_check_is_due_until_it_was_made_and_again_after_a_loss() -> None:
+    order = ByteOrder(7)
+    assert (order.is_doubtful, order.is_suspect) == (True, False)
+    order.forget()
+    assert (order.is_doubtful, order.is_suspect) == (True, False), "nothing was known"
+    order.note_tested()
+    assert (order.is_doubtful, order.is_suspect) == (False, False)
+    order.forget()
+    assert (order.is_doubtful, order.is_suspect) == (True, True)
+    order.note_tested()
+    assert (order.is_doubtful, order.is_suspect) == (False, False)

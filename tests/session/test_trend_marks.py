@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import msgspec
 import pytest
@@ -12,6 +14,7 @@ from tests.ui import fakes
 from tui.bus.program import Program
 from tui.bus.written import DeviceWritten
 from tui.drive.profile import library
+from tui.session.monitor import trend as trends
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.trend import (
     COMMAND_REACH,
@@ -142,3 +145,26 @@ def test_family_without_a_confirmed_frequency_keeps_its_raw_values(family: str) 
     assert current is not None
     raws = {"10.40": 3, output.code: 4512, current.code: 118}
     assert Trend(profile).add(fakes.snapshot_of(profile, raws)).values == (4512, 118, None)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "directed"),
+    [("output_frequency", True), ("frequency_reference", True), ("motor_current", False)],
+)
+def test_frequency_in_a_trend_has_the_sign_of_its_direction_and_a_current_none(
+    quantity: str, directed: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    signed: list[object] = []
+
+    def with_direction(*those: object) -> float:
+        signed.append(those)
+        return -30.0
+
+    monkeypatch.setattr(trends, "with_direction", with_direction)
+    parameter = SimpleNamespace(quantity=quantity)
+    reading = SimpleNamespace(number=30.0, parameter=parameter)
+    state = cast(Any, object())
+    assert trends.trend_value(cast(Any, reading), state) == (-30.0 if directed else 30.0)
+    assert signed == [(parameter, 30.0, state)] * directed
+    reading.number = None
+    assert trends.trend_value(cast(Any, reading), state) is None
