@@ -1,4 +1,4 @@
-"""What the line knows of each device: how long it waits, and for which replies, to the boundary."""
+"""The knowledge of a line about each device, to the boundary: its patience and late replies."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ import pytest
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.drive import DriveSession
-from tui.session.drive_state import channel_text, drive_state
+from tui.session.drive_state import channel_text, drive_state, with_direction
 from tui.session.reading import Reading
 from tui.session.shown import Quality
 
@@ -144,3 +144,18 @@ def test_motor_that_runs_or_still_stops_does_not_stand(
     assert reported == ([50.0] if stands else [])
     session.note_state("ready", 45.0)
     assert session.rest_seen == (50.0 if may_have_stood else 45.0), "never an earlier time"
+
+
+@pytest.mark.parametrize(
+    ("kind", "direction", "number"),
+    [
+        ("uint16", "reverse", -30.0), ("uint16", "forward", 30.0), ("uint16", None, 30.0),
+        ("int16", "reverse", 30.0), ("int32", "reverse", 30.0),
+    ],
+)  # fmt: skip
+def test_frequency_without_a_sign_gets_that_of_the_direction(
+    kind: str, direction: str | None, number: float
+) -> None:
+    words = SimpleNamespace(type=kind)
+    state = SimpleNamespace(direction=direction)
+    assert with_direction(cast(Any, words), 30.0, cast(Any, state)) == number

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from decimal import Decimal
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
 from tui.bus.api import Priority, Reply
 from tui.bus.errors import NoAnswer
+from tui.drive.read_plan import Place, ReadPlan, ReadRequest
 from tui.session.drive import DriveSession
 from tui.session.read.kept_plans import PLANS_KEPT
 from tui.session.read.reader import Reader
@@ -157,7 +159,7 @@ async def test_unanswered_read_is_an_error_not_a_value() -> None:
         await Reader(DriveSession(line, 1, profile_of(parameter("P1", 1)))).read(["P1"])
 
 
-class Asked(OneDrive):
+class HowRead(OneDrive):
     """A drive that notes how each read is requested."""
 
     def __init__(self, registers: dict[int, int]) -> None:
@@ -173,7 +175,7 @@ class Asked(OneDrive):
 async def test_read_has_the_priority_of_its_caller_and_the_function_of_its_words(
     priority: Priority,
 ) -> None:
-    line = Asked({1: 1, 2: 2, 9: 9})
+    line = HowRead({1: 1, 2: 2, 9: 9})
     words = (parameter("P1", 1), parameter("P2", 2), parameter("P9", 9, function=4))
     functions = [{"code": code, "name": "Read", "max_read": 20} for code in (3, 4)]
     reader = Reader(DriveSession(line, 1, profile_of(*words, functions=functions)))
@@ -183,6 +185,56 @@ async def test_read_has_the_priority_of_its_caller_and_the_function_of_its_words
     assert sorted(how["function"] for how in line.how) == [3, 4]
     # only a poll may be answered by a value that another program has read
     assert {how["max_age"] > 0 for how in line.how} == {priority >= Priority.POLL}
+
+
+class Planned:
+    """A reader whose plans are empty; it notes the slots that they may use."""
+
+    def __init__(self) -> None:
+        self.line = OneDrive({1: 1})
+        self.reader = Reader(DriveSession(self.line, 1, profile_of(parameter("P1", 1))))
+        self.slots: list[object] = []
+        self.answers = 0
+        plans = SimpleNamespace(plan=self._plan)
+        slots = SimpleNamespace(in_force=lambda: {"S1": 9}, heard=self._heard, learned=0.0)
+        self.reader._plans, self.reader._slots = cast(Any, plans), cast(Any, slots)
+
+    def _plan(self, codes: frozenset[str], slots: object = None) -> ReadPlan:
+        self.slots.append(slots)
+        return ReadPlan((), 0.0)
+
+    def _heard(self) -> None:
+        self.answers += 1
+
+
+@pytest.mark.parametrize("priority", [*Priority])
+async def test_only_polls_use_blocks_and_name_the_one_they_used(priority: Priority) -> None:
+    here = Planned()
+    here.reader.using = "Scanner"
+    await here.reader.read(["P1"], priority=priority)
+    polled = priority >= Priority.POLL
+    assert here.slots[0] == ({"S1": 9} if polled else {})
+    assert here.reader.using == ("" if polled else "Scanner")
+
+
+async def test_each_answer_shows_that_the_drive_was_not_switched_off() -> None:
+    here = Planned()
+    places = [ReadRequest(1, 1, (Place("P1", 0),)) for _ in range(2)]
+    await here.reader._follow(ReadPlan(tuple(places), 0.0), Priority.POLL)
+    assert here.answers == 2
+
+
+async def test_word_of_doubtful_documents_is_read_once_and_alone() -> None:
+    line = OneDrive({1: 1, 2: 2})
+    functions = [{"code": 3, "name": "Read", "max_read": 20, "past_limit": "silence"}]
+    words = (parameter("P1", 1), parameter("P2", 2, confidence="unverified"))
+    reader = Reader(DriveSession(line, 1, profile_of(*words, functions=functions)))
+    found = await reader.read(["P1", "P2"])
+    assert {code: reading.raw for code, reading in found.items()} == {"P1": 1, "P2": 2}
+    assert line.requested == [(1, 1), (2, 1)]
+    line.requests.clear()
+    await reader.read(["P1", "P2"])
+    assert line.requested == [(1, 2)], "it has answered, and is like the others"
 
 
 def test_line_gets_the_limits_of_the_profile() -> None:
