@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
+from tests.line_events import on_event
+from tui.bus.ended_exchange import EndedExchange
 from tui.bus.errors import (
     OUTCOME_UNKNOWN,
     ChecksumFault,
@@ -19,11 +22,14 @@ from tui.bus.limits import CAUTIOUS, STANDARD_EXCEPTIONS
 from tui.bus.master import ExchangeResult, Piece, ResultKind
 from tui.bus.model import Priority, Reply, Timing
 from tui.bus.requests import Read, Request, WriteOne
+from tui.bus.schedule import outcomes as outcomes_module
 from tui.bus.schedule.outcomes import Next, Outcomes
 from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
+from tui.bus.written import DeviceWritten
+from tui.wire.frames import frame
 
 from .conftest import WIDE
 from .peer import reply
@@ -299,3 +305,165 @@ def test_reply_that_waited_for_this_program_is_requested_again(
     for lay, doubted in ((longest + 0.9, False), (longest + 1.1, again)):
         result = ExchangeResult(kind, end=10.0 - lay, turnaround=0.0)
         assert ends.outcomes.waited_for_us(job, result) == doubted
+
+
+# -- what is counted and reported ------------------------------------------------------------------
+
+
+class Counted(Ends):
+    """Ends of requests whose counts are noted by their names."""
+
+    def __init__(self, **how: Any) -> None:
+        super().__init__(**how)
+        self.counts: list[tuple[object, ...]] = []
+        names = [name for name in dir(self.tally) if name.startswith("count_")]
+        counts = {name: self._noted(name.removeprefix("count_")) for name in names}
+        self.outcomes._tally = self.counter = cast(Any, SimpleNamespace(stale=0, **counts))
+
+    def _noted(self, name: str) -> Any:
+        def count(*those: object, **how: object) -> None:
+            self.counts.append((name, *those, *how.values()))
+
+        return count
+
+
+@pytest.mark.parametrize(
+    ("kind", "known", "priority", "counts"),
+    [
+        (ResultKind.REPLY, True, Priority.POLL, [("reply", 1, 0.125), ("good", 1, True)]),
+        (ResultKind.REPLY, False, Priority.POLL, [("reply", 1, 0.125), ("good", 1, False)]),
+        (ResultKind.EXCEPTION, True, Priority.POLL,
+         [("reply", 1, 0.125), ("good", 1, True), ("exception", 1, 2)]),
+        (ResultKind.DAMAGED, True, Priority.POLL,
+         [("minute", 1, "damaged"), ("checksum", 1), ("repeat", 1)]),
+        (ResultKind.DAMAGED, False, Priority.BACKGROUND, [("checksum", 1)]),
+        (ResultKind.DAMAGED, True, Priority.BACKGROUND,
+         [("minute", 1, "damaged"), ("checksum", 1)]),
+        (ResultKind.WRONG, True, Priority.OPERATOR_READ, [("minute", 1, "damaged"), ("wrong", 1)]),
+        (ResultKind.NOTHING, False, Priority.BACKGROUND, [("silence", 1, True)]),
+        (ResultKind.NOTHING, False, Priority.POLL, [("silence", 1, False)]),
+        (ResultKind.NOTHING, True, Priority.BACKGROUND, [("silence", 1, False)]),
+    ],
+)  # fmt: skip
+def test_each_end_is_counted_for_its_drive(
+    kind: ResultKind, known: bool, priority: Priority, counts: list[tuple[object, ...]]
+) -> None:
+    ends = Counted(known=known)
+    ends.end(read(priority), kind, pdu=VALUE, exception=2)
+    assert ends.counts == counts
+
+
+def test_request_with_a_timeout_of_its_own_searches_for_a_drive() -> None:
+    ends = Counted()
+    ends.end(read(Priority.BACKGROUND, within=0.1), ResultKind.NOTHING)
+    assert ends.counts == [("silence", 1, True)]
+
+
+@pytest.mark.parametrize(
+    ("failures", "silent", "heard"),
+    [(0, None, True), (2, 60.0, True), (3, 60.0, False), (3, 4.9, True), (3, 5.0, False)],
+)
+def test_few_or_short_misses_of_a_drive_are_those_of_the_line(
+    failures: int, silent: float | None, heard: bool
+) -> None:
+    ends = Counted()
+    record = ends.devices[1]
+    record.failures = failures
+    record.silent_since = None if silent is None else 10.0 - silent
+    ends.end(read(), ResultKind.REPLY, pdu=VALUE)
+    assert ends.counts[1] == ("good", 1, heard)
+
+
+@pytest.mark.parametrize("kind", [*ResultKind])
+def test_additional_exchange_is_counted_if_it_brought_a_reply(kind: ResultKind) -> None:
+    ends = Counted()
+    ends.outcomes.count_beside(1, ExchangeResult(kind, turnaround=0.25, end=9.0))
+    good = kind in (ResultKind.REPLY, ResultKind.EXCEPTION)
+    assert ends.counts == ([("reply", 1, 0.25), ("good", 1, True)] if good else [])
+
+
+@pytest.mark.parametrize("kind", [*ResultKind])
+def test_exchange_is_recorded_as_it_was_on_the_wire(
+    kind: ResultKind, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends = Ends()
+    monkeypatch.setattr(outcomes_module, "time", lambda: 5000.0)
+    kept: list[EndedExchange] = []
+    stray = Piece(reply(bytes([1, 3, 0, 100, 0, 1, 0, 0])), whole=True)
+    result = ExchangeResult(kind, pdu=VALUE, received=b"noise", sent=9.5, end=9.75, strays=[stray])
+    ends.outcomes.record(1, b"request", result)
+    ends.facts.record = kept.append
+    job = read(program="p1", repeats=2)
+    ends.outcomes.record(1, b"request", result, job)
+    ends.outcomes.record(1, b"request", result, job, "copy")
+    ends.outcomes.record(1, b"request", result)
+    good = kind in (ResultKind.REPLY, ResultKind.EXCEPTION)
+    expected = EndedExchange(
+        1, b"request", kind.value, VALUE if good else b"noise", 9.5, 9.75, 4999.75, "p1", 2,
+        (stray.data,),
+    )  # fmt: skip
+    assert kept == [
+        expected, expected._replace(result="copy"), expected._replace(program="", repeat=0),
+    ]  # fmt: skip
+
+
+def test_recorder_that_fails_is_used_no_longer(caplog: pytest.LogCaptureFixture) -> None:
+    ends = Ends()
+
+    def full(_: object) -> None:
+        raise OSError("the disk is full")
+
+    ends.facts.record = full
+    ends.outcomes.record(1, b"request", ExchangeResult(ResultKind.REPLY))
+    assert ends.facts.record is None
+    assert "the recorder failed" in caplog.text
+
+
+@pytest.mark.parametrize(
+    ("known", "kind", "data", "counted"),
+    [
+        (True, "late", b"", []), (True, "copy", b"", [("minute", 1, "strays")]),
+        (True, "", b"", [("minute", 1, "strays")]), (False, "", b"", [("minute", None, "foreign")]),
+        (True, "", bytes([1, 3, 0, 100, 0, 1]), [("minute", None, "foreign")]),
+        (True, "copy", bytes([1, 3, 0, 100, 0, 1]), [("minute", 1, "strays")]),
+    ],
+)  # fmt: skip
+def test_stray_frame_is_counted_by_its_origin(
+    known: bool, kind: str, data: bytes, counted: list[object]
+) -> None:
+    ends = Counted(known=known)
+    judged: list[object] = []
+
+    def stray(piece: Piece, time: float) -> str:
+        judged.append((piece, time))
+        return kind
+
+    ends.devices.stray = stray  # type: ignore[method-assign,assignment]
+    whole = frame(data[0], data[1:]) if data else frame(1, VALUE)
+    piece = Piece(whole, whole=True)
+    assert ends.outcomes.note_strays([piece], 9.0) == (set() if kind else {1})
+    assert ends.counts == counted
+    assert ends.counter.stale == 1
+    assert judged == [(piece, 9.0)]
+
+
+def test_written_registers_are_reported_with_their_program_and_time() -> None:
+    ends = Ends()
+    here, other, left = (
+        cast(Any, SimpleNamespace(id=name)) for name in (ends.facts.me.id, "other", "left")
+    )
+    ends.facts.programs, ends.facts.departed = (here, other), (left,)
+    seen: list[DeviceWritten] = []
+    on_event(ends.facts, DeviceWritten, seen.append)
+    for program in ("", "other", "left", "never there"):
+        job = Job(WriteOne(1, 8501, 15), Priority.OPERATOR_WRITE, WIDE, program=program)
+        ends.end(job, ResultKind.REPLY, pdu=job.pdu)
+    ends.end(read(), ResultKind.REPLY, pdu=VALUE)
+    ends.end(command(), ResultKind.EXCEPTION, exception=2)
+    assert [(each.device, each.address, list(each.values), each.program.id, each.time)
+            for each in seen] == [
+        (1, 8501, [15], name, 9.75) for name in (here.id, "other", "left")
+    ]  # fmt: skip
+    broadcast = Job(WriteOne(0, 8501, 0), Priority.STOP, WIDE)
+    ends.end(broadcast, ResultKind.NOTHING)
+    assert (seen[-1].device, seen[-1].time) == (0, 9.5)
