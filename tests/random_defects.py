@@ -327,30 +327,37 @@ def _exists(name: str) -> bool:
 class Judge:
     """Plants one defect at a time in copies, and believes only a test that fails by it alone."""
 
-    def __init__(self, chooser: Chooser, forks: Mapping[Path, Forks]) -> None:
+    def __init__(
+        self, chooser: Chooser, mutants: Iterable[Mutant], forks: Mapping[Path, Forks]
+    ) -> None:
         self._chooser = chooser
         self._forks = forks
+        # by the source of this moment, which the copies have
+        self._tests = {
+            mutant: (chooser.tests(mutant), chooser.runs_at_import(mutant)) for mutant in mutants
+        }
         self._passes: dict[str, bool] = {}
 
     def judge(self, mutant: Mutant, copy: Path) -> Judged:
         """Plant a defect in a copy and run the tests that reach it."""
         begun = time.monotonic()
-        tests = self._chooser.tests(mutant)
+        tests, runs_at_import = self._tests[mutant]
         if mutant.identity in EQUIVALENT:
             by = EQUAL
         else:
-            by = self._noticed_by(mutant, tests, copy) if tests else UNREACHED
+            by = self._noticed_by(mutant, tests, copy, runs_at_import) if tests else UNREACHED
         package = mutant.path.split("/")[1]
         seconds = time.monotonic() - begun
         count = sum(map(len, tests))
         return Judged(mutant.identity, package, mutant.line, by, seconds, count)
 
-    def _noticed_by(self, mutant: Mutant, parts: list[list[str]], copy: Path) -> str:
+    def _noticed_by(
+        self, mutant: Mutant, parts: list[list[str]], copy: Path, runs_at_import: bool
+    ) -> str:
         """The test that fails in forks, or in a new process if only that runs the defect."""
         path = copy / mutant.path
         before = path.read_text("utf-8")
         after = mutant.apply(before)
-        runs_at_import = self._chooser.runs_at_import(mutant)
 
         def in_fork(tests: list[str], defective: bool) -> str:
             change = (mutant.path, before, after) if defective else ("", "", "")
@@ -476,7 +483,7 @@ def main(requested: argparse.Namespace) -> int:
 
     with copies(requested.jobs) as made, ExitStack() as stack:
         forks = {copy: stack.enter_context(closing(Forks(copy))) for copy in made}
-        dealt(Judge(Chooser(record), forks).judge, mutants, made, show)
+        dealt(Judge(Chooser(record), mutants, forks).judge, mutants, made, show)
     print(
         f"\n{len(mutants)} defects, seed {requested.seed}, recorded at {record.commits[0][:12]}\n"
     )
