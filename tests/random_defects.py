@@ -38,7 +38,7 @@ MOST_TESTS = 60, 80
 """Tests that are run for one defect, and as many more if none of them fails."""
 MOST_ALIKE = 3
 """Tests of one function with other parameters that are run for one defect, if there are others."""
-MOST_SECONDS = 60.0, 60.0
+MOST_SECONDS = 40.0, 40.0
 """Time of these tests, as recorded."""
 FOLDERS = {"screens": "ui", "keeper": "session"}
 """By package: the folder of its tests, if it has another name."""

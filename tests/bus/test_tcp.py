@@ -304,7 +304,7 @@ async def test_end_of_a_connection_is_reported_once_with_its_reason(
         await transport.send(b"frame")
 
 
-def test_what_came_before_the_start_is_passed_on_once() -> None:
+def test_early_bytes_are_passed_on_once() -> None:
     transport, first, second = TcpTransport(), Heard(), Heard()
     transport.connection_made(Connected())
     transport.start(second)
