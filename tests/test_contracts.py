@@ -92,7 +92,7 @@ def test_each_module_is_imported_or_run() -> None:
     from tui.screens.keys.screens import PACKAGES
 
     by_name = {f"tui.screens.{package}.registration" for package in PACKAGES}
-    by_name |= {f"tui.cli.commands.{module}" for module, _ in COMMANDS.values()}
+    by_name |= {f"tui.cli.commands.{module}" for module, *_ in COMMANDS.values()}
     by_name |= {"tui.__main__", "tui.keeper.__main__", "tui.cli.derived", "tui.screens.keys.pages"}
     by_name.add("tui.bus.fake")  # for tests of scripts
     paths = {

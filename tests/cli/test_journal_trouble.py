@@ -123,7 +123,7 @@ def test_lost_output_does_not_report_done_work_as_failed(
 def test_lost_requested_output_is_a_failure(more: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
         done = program(*READ, *more, out=full.fileno())
-    assert done.returncode == 70
+    assert done.returncode == 74
     assert done.stderr.splitlines() == [
         "drivepanel: What was printed is lost: standard output cannot be written: No space left on"
         " device."

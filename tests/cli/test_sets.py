@@ -9,6 +9,7 @@ import os
 import re
 import signal
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -22,6 +23,7 @@ from tui.bus.errors import LineLost
 from tui.cli.shared.say import Messages
 from tui.cli.shared.sets import say_afterwards
 from tui.drive.settings.restore_plan import RestorePlan
+from tui.drive.small_file import supplied
 from tui.session.settings.restore import plan_for
 
 from .commands import ended, held, invoked, motor, refused, run, tcp_line
@@ -301,7 +303,6 @@ def test_no_answer_exits_with_3(tmp_path: Path) -> None:
 WRITES_REFUSED_HERE = [
     (("ACC=5",), "Not armed"),
     (("ACC=100000", "--arm"), "out of range"),
-    (("ACC=soon", "--arm"), "'soon'"),
     (("RFR=5", "--arm"), "only be read"),
     (("CMD=6", "--arm"), "is a command"),
     (("BIR=1", "--arm"), "unverified"),
@@ -431,3 +432,49 @@ def test_steps_left_after_a_write_are_reported(
     say_afterwards(messages, after_reset, unsaved, saved=saved)
     assert len(messages.texts) == len(parts)
     assert all(part in text for part, text in zip(parts, messages.texts, strict=True))
+
+
+def test_dash_is_standard_output_and_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
+    line = "sim:atv71@2"
+    text = run(0, "backup", line, "-", "-d", "2")
+    assert f'line = "{line}"' in text
+    assert "settings of" not in text
+
+    def supply(data: str) -> None:
+        supplied.clear()
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data.encode())))
+
+    supply(text)
+    assert "529 equal already" in run(0, "restore", line, "-", "--dry-run", "-d", "2")
+    supply(text)
+    assert "No setting differs" in run(0, "compare", line, "-", "-d", "2")
+    supply("[set]\nformat")
+    assert "drivepanel: -:2: " in refused(2, "restore", line, "-", "--dry-run", "-d", "2")
+    supply(Path("profiles/atv21.toml").read_text("utf-8"))
+    assert "-: Altivar 21, 207 parameters, no fault found." in run(0, "profiles", "--check", "-")
+    blocks = run(0, "block", line, "save", "-", "-d", "2")
+    supply(blocks)
+    run(0, "block", line, "load", "-", "--dry-run", "-d", "2")
+    assert run(0, "report", line, "-", "-d", "2").startswith(f"# Altivar 71 at {line}, address 2\n")
+    for command in ("backup", "report"):
+        assert "both write to standard output" in refused(2, command, line, "-", "--json")
+    assert not Path("-").exists()
+    supplied.clear()
+
+
+def test_nothing_to_write_is_no_refusal_on_a_read_only_line(tmp_path: Path) -> None:
+    file, line = tmp_path / "set.toml", "sim:atv71"
+    run(0, "backup", line, file)
+    acceleration = re.search(r'^ACC += \{.*value = "([^"]+)"', file.read_text(), re.M)
+    assert acceleration is not None
+    same = f"ACC={acceleration[1]}"
+    assert "holds these values already" in run(0, "write", line, same, "--arm", "--read-only")
+    assert "0 not written" in run(0, "restore", line, file, "--arm", "--read-only")
+    for command in (("write", line, "ACC=7.7"), ("write", line, same, "--save"),
+                    ("restore", line, file, "--save")):  # fmt: skip
+        assert "is read-only" in refused(5, *command, "--arm", "--read-only")
+
+
+@pytest.mark.parametrize("typed", ["ACC=abc", "ACC=16#zz", "CHCF=Nowhere", "NOSUCH=3"])
+def test_bad_value_and_bad_code_have_one_status(typed: str) -> None:
+    refused(2, "write", "sim:atv71", typed, "--arm")

@@ -394,7 +394,8 @@ def test_short_stop_reaches_the_holder() -> None:
                 lambda event: heard.append((event.devices, event.by)),
             )
             stop_at_once(["stop", line, "-d", "2", "-d", "3"])
-            assert heard == [((2, 3), "drivepanel stop")]
+            # the program of its process, here the panel, is named
+            assert heard == [((2, 3), "a direct stop")]
 
 
 @pytest.mark.parametrize("closes", [False, True])

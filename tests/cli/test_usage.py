@@ -7,6 +7,7 @@ import json
 import pytest
 
 from tui.cli.command_index import COMMANDS
+from tui.cli.shared.registration import GROUPS
 
 from .commands import ended, invoked, refused, run
 
@@ -66,6 +67,17 @@ def test_json_error_is_one_object_on_standard_output(
 
 def test_error_without_json_prints_nothing_on_standard_output() -> None:
     assert ended(2, "read", *SIM, "NOSUCH").stdout == ""
+
+
+def test_help_lists_each_command_under_its_heading() -> None:
+    printed = invoked("--help").stdout
+    headings = [f"\n{group}:\n" for group in GROUPS[:-1]]
+    at = [printed.index(heading) for heading in headings]
+    assert at == sorted(at)
+    assert f"{GROUPS[-1]}:" not in printed, "each command has a group"
+    for name, (_, group, summary) in COMMANDS.items():
+        row = printed.index(f"  {name:<{max(map(len, COMMANDS))}}  {summary}")
+        assert max(start for start in at if start < row) == printed.index(f"\n{group}:\n")
 
 
 def test_help_lists_the_exit_statuses() -> None:

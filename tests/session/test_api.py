@@ -49,6 +49,13 @@ def drive(line: DriveLine) -> Drive:
     return line.drive()
 
 
+@pytest.mark.parametrize("address", [0, 248, -1, "x", "1", 1.5, None])
+def test_wrong_address_is_reported(line: DriveLine, address: object) -> None:
+    with pytest.raises(DriveError, match="cannot be the address of a drive: use 1 to 247"):
+        line.drive(address)  # type: ignore[arg-type]
+    assert line.drive(1).profile == "atv71", "the line is not lost by it"
+
+
 @pytest.mark.parametrize("example", EXAMPLES)
 def test_examples_of_the_page_print_what_it_shows(
     example: str, capsys: pytest.CaptureFixture[str]

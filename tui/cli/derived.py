@@ -29,7 +29,7 @@ from . import commands
 from .command_index import COMMANDS
 from .documents.document import Document
 from .main import main
-from .shared.registration import RegisteredCommand
+from .shared.registration import GROUPS, RegisteredCommand
 
 NAME = "drivepanel"
 _LINE_HELP, _, _STATUSES = (main.epilog or "").partition("Exit status:")
@@ -190,14 +190,14 @@ def _require_printed(part: dict[str, Any]) -> None:
 
 CLI = Path(__file__).parent
 DOCS = CLI.parents[1] / "docs"
-INDEX_HEAD = '''"""Commands by name, each with its module and its line of help.
+INDEX_HEAD = '''"""Commands by name, each with its module, its heading and its line of help.
 
 Made by `python -m tui.cli.derived`.
 """
 
 from __future__ import annotations
 
-COMMANDS: dict[str, tuple[str, str]] = {
+COMMANDS: dict[str, tuple[str, str, str]] = {
 '''
 COMMAND_TABLE = re.compile(r"(<!-- commands -->\n).*?(<!-- end of commands -->)", re.DOTALL)
 
@@ -219,10 +219,14 @@ def _module(command: RegisteredCommand) -> str:
     return command.callback.__module__
 
 
-def index() -> dict[str, tuple[str, str]]:
-    """Module and line of help of each command that is listed."""
+def index() -> dict[str, tuple[str, str, str]]:
+    """Module, heading and line of help of each command that is listed."""
     return {
-        name: (_module(command).rpartition(".")[2], command.short_help or "")
+        name: (
+            _module(command).rpartition(".")[2],
+            command.group or GROUPS[-1],
+            command.short_help or "",
+        )
         for name, command in registered().items()
         if not command.hidden
     }
@@ -231,8 +235,8 @@ def index() -> dict[str, tuple[str, str]]:
 def command_index() -> str:
     """The module `command_index`, so that the help and a completion import no command."""
     rows = (
-        f"    {_quoted(name)}: ({_quoted(module)}, {_quoted(summary)}),\n"
-        for name, (module, summary) in index().items()
+        f"    {_quoted(name)}: ({_quoted(module)}, {_quoted(group)}, {_quoted(summary)}),\n"
+        for name, (module, group, summary) in index().items()
     )
     return f"{INDEX_HEAD}{''.join(rows)}}}\n"
 

@@ -14,6 +14,7 @@ from tui.session.logs import start_logging
 from .command_index import COMMANDS
 from .shared.errors import plain_errors
 from .shared.line_argument import is_line
+from .shared.registration import GROUPS
 from .shared.typed import note_typed
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ Exit status:
     5  refused by Drive Panel: nothing was written
     6  ended after something was written; the message names it
    70  internal error; see the log
+   74  what was printed is lost, for example because the disk is full
   130  ended by Ctrl-C
 """
 AS_JSON = "drivepanel.json"
@@ -136,15 +138,23 @@ class Commands(click.Group):
         from .shared.completion import complete_line
 
         names = [
-            CompletionItem(name, help=reported) for name, (_, reported) in sorted(COMMANDS.items())
+            CompletionItem(name, help=reported) for name, (*_, reported) in sorted(COMMANDS.items())
         ]
         lines = complete_line(ctx, panel.params[0], incomplete)
         return [*(item for item in names if item.value.startswith(incomplete)), *lines]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """List the subcommands without importing them."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name][1]) for name in self.list_commands(ctx)])
+        """List the subcommands by group, without importing them."""
+        widest = max(map(len, COMMANDS))
+        for group in GROUPS:
+            rows = [
+                (f"{name:{widest}}", reported)
+                for name, (_, heading, reported) in sorted(COMMANDS.items())
+                if heading == group
+            ]
+            if rows:
+                with formatter.section(group):
+                    formatter.write_dl(rows)
 
 
 def no_such_command(name: str) -> str:

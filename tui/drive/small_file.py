@@ -10,6 +10,9 @@ import os
 import stat
 from pathlib import Path
 
+supplied: dict[Path, bytes] = {}
+"""Content to read in place of a file, by path: what a command has read from standard input."""
+
 LONGEST_TEXT = 2_000_000
 """Most bytes of a profile, a parameter set, a block file, or a file of Drive Panel."""
 
@@ -30,8 +33,9 @@ def open_regular(path: Path) -> int:
 
 def read_small(path: Path, longest: int = LONGEST_TEXT) -> bytes:
     """Read a file. Raises OSError, also if it has more than `longest` bytes or is not a file."""
-    with os.fdopen(open_regular(path), "rb") as file:
-        data = file.read(longest + 1)
+    if (data := supplied.get(path)) is None:
+        with os.fdopen(open_regular(path), "rb") as file:
+            data = file.read(longest + 1)
     if len(data) > longest:
         raise OSError(errno.EFBIG, f"it is longer than {longest // 1000} kB", str(path))
     return data

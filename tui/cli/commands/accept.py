@@ -97,7 +97,9 @@ class AcceptDocument(DriveDocument, kw_only=True):
     steps: list[AcceptanceStepField]
 
 
-@command("Run an acceptance test from a file.", statuses=(DIFFERENT, *WRITING), acts=True)
+@command(
+    "Run an acceptance test from a file.", group="Run", statuses=(DIFFERENT, *WRITING), acts=True
+)
 @click.argument("file", type=click.Path(path_type=Path, dir_okay=False))
 @line_argument
 @drive_options

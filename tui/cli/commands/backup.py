@@ -9,24 +9,22 @@ import click
 from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.registration import ON_LINE, command
-from ..shared.say import Messages, say
+from ..shared.say import Messages
 from ..shared.sets import (
     complain_absent,
     file_argument,
     force_option,
-    refuse_existing,
+    refuse_output,
     set_of_drive,
     write_down,
 )
-
-STANDARD_OUTPUT = Path("-")
-
+from ..shared.standard_streams import STANDARD
 
 _PARAMETERS = "{file}: {count} parameters of {name}"
 _SETTINGS = "{file}: {count} settings of {name}"
 
 
-@command("Back up a drive's settings to a file.", statuses=ON_LINE)
+@command("Back up a drive's settings to a file.", group="Set up", statuses=ON_LINE)
 @line_argument
 @file_argument
 @force_option
@@ -47,23 +45,16 @@ def backup(target: Target, file: Path, force: bool, everything: bool, as_json: b
     from ..documents.setting_documents import BackupDocument
     from ..shared.output import drive_fields, print_json
 
-    to_output = file == STANDARD_OUTPUT
-    if to_output and as_json:
-        raise click.UsageError("Either - or --json: both write to standard output.")
-    if not to_output:
-        refuse_existing(file, force=force)
+    refuse_output(file, force=force, as_json=as_json)
     try:
         session, values = set_of_drive(target, settings_only=not everything)
     except KeyboardInterrupt:
         raise Failure("Ended by Ctrl-C: nothing was written.", INTERRUPTED) from None
     text = dump_set(session.profile, values)
-    messages = Messages(as_json=as_json)
-    if to_output:
-        say(text.removesuffix("\n"))
-    else:
-        write_down(file, text, force=force)
-        text = _PARAMETERS if everything else _SETTINGS
-        messages.tell(text.format(file=file, count=len(values.raws), name=session.profile.name))
+    messages = Messages(as_json=as_json or file == STANDARD)
+    write_down(file, text, force=force)
+    text = _PARAMETERS if everything else _SETTINGS
+    messages.tell(text.format(file=file, count=len(values.raws), name=session.profile.name))
     complain_absent(messages, values.absent)
     if as_json:
         print_json(

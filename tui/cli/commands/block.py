@@ -40,7 +40,8 @@ from ..shared.options import (
 )
 from ..shared.registration import WRITING, command
 from ..shared.say import say
-from ..shared.sets import dry_run_option, write_down
+from ..shared.sets import dry_run_option, refuse_output, write_down
+from ..shared.standard_streams import STANDARD, given_file
 
 if TYPE_CHECKING:
     from tui.drive.blocks.assignment import Assignment
@@ -55,7 +56,10 @@ WRITING_ACTIONS = frozenset({"set", "factory", "load"})
 
 
 @command(
-    "Show or change a drive's indirect block or scanner.", statuses=(DIFFERENT, *WRITING), acts=True
+    "Show or change a drive's indirect block or scanner.",
+    group="Set up",
+    statuses=(DIFFERENT, *WRITING),
+    acts=True,
 )
 @line_argument
 @click.argument("action", type=click.Choice(BLOCK_COMMANDS), default="show")
@@ -82,8 +86,8 @@ def block(
     verify            the same, compared several times; ends with 1 if a slot differs
     set NMA3=LCR ...  map slots to a code, a number, an address, or none
     factory           map every slot as in the factory setting
-    load FILE         map the slots as in a file
-    save FILE         save the present slots to a file, one line each
+    load FILE         map the slots as in a file; - is standard input
+    save FILE         save the present slots to a file, one line each; - is standard output
 
     Slots are written at standstill, one after another, each read back. Another master on the line
     may rely on the present assignment.
@@ -167,16 +171,17 @@ def _save(session: DriveSession, line_text: str, views: list[BlockView], wanted:
     from ..shared.output import drive_fields, print_json
 
     file = Path(wanted.words[0])
+    refuse_output(file, force=False, as_json=wanted.as_json)
     plans = [plan for view in views if (plan := view.plan) is not None]
     if len(plans) != len(views):
         raise Failure("Not every slot could be read; nothing was saved.", DRIVE_REFUSED)
-    note = f"{session.profile.name}, device {session.device}, {session.line_text}"
+    note = f"{session.profile.name}, device {session.device}, {line_text}"
     write_down(file, dump_blocks(session.profile, plans, note))
     count = sum(len(plan.raws) for plan in plans)
     if wanted.as_json:
         fields = drive_fields(line_text, session)
         print_json(BlockFileDocument(**fields, file=str(file), slots=count))
-    else:
+    elif file != STANDARD:
         say(f"{file}: {count} slots of {session.profile.name}")
     return DONE
 
@@ -311,7 +316,7 @@ def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
         return {}
     file = wanted.words[0]
     try:
-        return load_blocks(read_small_text(Path(file)), file, session.profile)
+        return load_blocks(read_small_text(given_file(Path(file))), file, session.profile)
     except OSError as error:
         raise Failure(f"{file} cannot be read: {error.strerror}.", USAGE) from error
     except UnicodeDecodeError as error:

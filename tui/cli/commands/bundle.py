@@ -22,7 +22,8 @@ from ..shared.options import (
 )
 from ..shared.registration import ON_LINE, command
 from ..shared.say import Messages
-from ..shared.sets import refuse_existing, write_down
+from ..shared.sets import refuse_output, write_down
+from ..shared.standard_streams import STANDARD
 
 if TYPE_CHECKING:
     from tui.bus.errors import LineError
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 
-@command("Collect all evidence about a line in one file.", statuses=ON_LINE)
+@command("Collect all evidence about a line in one file.", group="Troubleshoot", statuses=ON_LINE)
 @line_argument
 @devices_option("Include this drive; several times for several (default: those known).")
 @profile_of("Use this profile for drives that do not identify themselves.")
@@ -74,12 +75,12 @@ def bundle(
     link = _link_of(line_text)
     stem = bundle_name(link, datetime.now())
     file = file or Path(f"{stem}.zip")
-    refuse_existing(file, force=force)
+    refuse_output(file, force=force, as_json=as_json)
     if not file.absolute().parent.is_dir():
         raise Failure(f"{file}: there is no folder {file.parent}.", USAGE)
     made = _made(Target(line_text, 1, profile_id), devices, link, stem)
     write_down(file, made.data, force=force, private=True)
-    messages = Messages(as_json=as_json)
+    messages = Messages(as_json=as_json or file == STANDARD)
     messages.tell(f"{file}: {len(made.files)} files. README.txt in it explains each.")
     if made.missing:
         messages.tell(f"Could not get: {', '.join(made.missing)}. README.txt says why.")

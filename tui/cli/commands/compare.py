@@ -15,6 +15,7 @@ from ..shared.options import Target, devices_option, json_option, never_forced, 
 from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
+from ..shared.standard_streams import STANDARD
 
 if TYPE_CHECKING:
     from tui.drive.settings.compare import ComparedRow, TableFormat
@@ -25,7 +26,11 @@ if TYPE_CHECKING:
 FACTORY = "factory"
 
 
-@command("Compare settings of files, drives or factory defaults.", statuses=(DIFFERENT, *ON_LINE))
+@command(
+    "Compare settings of files, drives or factory defaults.",
+    group="Set up",
+    statuses=(DIFFERENT, *ON_LINE),
+)
 @click.argument("a", shell_complete=complete_side)
 @click.argument("b", shell_complete=complete_side, envvar=LINE_VARIABLE)
 @click.option("--all", "all_rows", is_flag=True, help="Show equal settings and measurements too.")
@@ -51,6 +56,8 @@ def compare(
     devices: tuple[int, ...],
 ) -> None:
     """Compare the settings of A and B: each a FILE, a LINE, or `factory`.
+
+    A FILE may be `-`: standard input.
 
     Measurements, counters and command words are not settings. A comparison with the factory omits
     address, baud rate and format. Ends with 0 if all are equal and with 1 if some differ.
@@ -123,7 +130,7 @@ def _row_field(row: ComparedRow) -> ComparedSettingField:
 def _set_of(text: str, target: Target) -> ParameterSet:
     """The parameter set in a file, or that of a drive, read now."""
     path = Path(text)
-    if path.is_file() or (path.suffix == ".toml" and os.path.lexists(path)):
+    if path == STANDARD or path.is_file() or (path.suffix == ".toml" and os.path.lexists(path)):
         return set_in(path)
     if path.suffix == ".toml":
         raise Failure(f"{text} is not there.", USAGE)

@@ -39,7 +39,11 @@ COUNTER_LOOKS = 3
 COUNTER_TITLES = titled(16)
 
 
-@command("Compare frame counts with the drive's own counters.", statuses=(DIFFERENT, *WRITING))
+@command(
+    "Compare frame counts with the drive's own counters.",
+    group="Troubleshoot",
+    statuses=(DIFFERENT, *WRITING),
+)
 @line_argument
 @drive_options
 @force_profile_option

@@ -48,7 +48,7 @@ class HeldTeller(Protocol):
     ) -> None: ...
 
 
-@command("Keep polling drives so that they do not time out.", statuses=ON_LINE)
+@command("Keep polling drives so that they do not time out.", group="Watch", statuses=ON_LINE)
 @line_argument
 @several_devices_option
 @profile_option

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 IDENTITY_TITLES = titled(9)
 
 
-@command("Show a drive's vendor, model and version.", statuses=ON_LINE)
+@command("Show a drive's vendor, model and version.", group="Watch", statuses=ON_LINE)
 @line_argument
 @several_devices_option
 @hold_option

@@ -62,7 +62,7 @@ def time_typed(_ctx: click.Context, _option: click.Parameter, text: str | None) 
     return found
 
 
-@command("Show writes, trips, runs and lost links of drives.")
+@command("Show writes, trips, runs and lost links of drives.", group="Watch")
 @click.option(
     "--drive",
     "wanted",

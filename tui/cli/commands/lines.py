@@ -26,7 +26,7 @@ NAMED_COLUMNS = (Column("name", width=11), Column("line"), Column("device"), Col
 DRIVE_COLUMNS = (Column("device", width=5, right=True), Column("drive"))
 
 
-@command("List named and remembered lines.")
+@command("List named and remembered lines.", group="Share")
 @json_option
 def lines(as_json: bool) -> None:
     """List the lines that the settings file names, and the stored adapters and drives.

@@ -37,7 +37,7 @@ PROGRAM_NAME = "listen"
 LAST_ADDRESS_HEARD = 255
 
 
-@command("Monitor traffic on a line; send nothing.", statuses=(LINE_TROUBLE,))
+@command("Monitor traffic on a line; send nothing.", group="Troubleshoot", statuses=(LINE_TROUBLE,))
 @click.argument("line_text", metavar="LINE", cls=LineArgument, shell_complete=complete_line)
 @click.option(
     "-p",

@@ -50,7 +50,7 @@ ascii_option = click.option(
 )
 
 
-@command("Open the panel on five running simulated drives.")
+@command("Open the panel on five running simulated drives.", group="Profiles")
 @low_bandwidth_option
 @on_hangup_option
 @mouse_option

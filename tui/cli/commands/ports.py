@@ -10,7 +10,7 @@ from ..shared.say import say
 PORT = titled(19)
 
 
-@command("List the serial ports of this computer.")
+@command("List the serial ports of this computer.", group="Troubleshoot")
 @json_option
 def ports(as_json: bool) -> None:
     """List the serial ports of this computer, and the programs that use them."""

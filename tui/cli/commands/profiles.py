@@ -15,6 +15,7 @@ from ..shared.options import json_option
 from ..shared.registration import command
 from ..shared.rows import GAP, Column, row_text, table_of
 from ..shared.say import say
+from ..shared.standard_streams import given_file
 
 if TYPE_CHECKING:
     from tui.drive.profile.library import Listing
@@ -32,7 +33,7 @@ PARAMETER_COLUMNS = (
 )
 
 
-@command("List, show or check drive profiles.")
+@command("List, show or check drive profiles.", group="Profiles")
 @click.argument(
     "profile_id",
     required=False,
@@ -74,7 +75,7 @@ def profiles(
 
     words = (*((profile_id,) if profile_id is not None else ()), *more)
     if file is not None:
-        check_files([file, *map(Path, words)], as_json)
+        check_files([given_file(path) for path in (file, *map(Path, words))], as_json)
     elif schema:
         from tui.drive.profile.json_schema import schema_text
 

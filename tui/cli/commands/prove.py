@@ -47,7 +47,9 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
 """Seconds that a motor may take to its standstill after a proof on the run."""
 
 
-@command("Test how a drive reacts to communication loss.", statuses=(DIFFERENT, *WRITING))
+@command(
+    "Test how a drive reacts to communication loss.", group="Run", statuses=(DIFFERENT, *WRITING)
+)
 @line_argument
 @drive_options
 @arm_option

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
 
 
-@command("Publish drive values to an MQTT broker.", statuses=ON_LINE)
+@command("Publish drive values to an MQTT broker.", group="Share", statuses=ON_LINE)
 @lines_argument
 @click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
 @drives_options

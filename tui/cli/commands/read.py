@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..documents.drive_documents import ReadDocument
 
 
-@command("Read parameters from a drive.", statuses=ON_LINE)
+@command("Read parameters from a drive.", group="Watch", statuses=ON_LINE)
 @line_argument
 @click.argument("codes", nargs=-1, required=True, metavar="CODE...", shell_complete=complete_code)
 @drives_options

@@ -134,7 +134,7 @@ class RecordedDrive:
         return [text for trigger in self.triggers if (text := trigger.fired(look))]
 
 
-@command("Record values to a file, always or around triggers.", statuses=ON_LINE)
+@command("Record values to a file, always or around triggers.", group="Watch", statuses=ON_LINE)
 @line_argument
 @click.argument(
     "codes", nargs=-1, required=True, metavar="CODE...", shell_complete=complete_line_or_code

@@ -12,7 +12,7 @@ from ..shared.registration import command
 from .panel import ascii_option, bell_option, low_bandwidth_option, mouse_option, run_panel
 
 
-@command("Show a record on the screens of the panel.")
+@command("Show a record on the screens of the panel.", group="Watch")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--at", "at", metavar="TIME", help="Begin at HH:MM[:SS], or at a date with a time.")
 @click.option(

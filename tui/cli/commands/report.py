@@ -11,13 +11,14 @@ from ..shared.say import Messages
 from ..shared.sets import (
     file_argument,
     force_option,
-    refuse_existing,
+    refuse_output,
     set_of_drive,
     write_down,
 )
+from ..shared.standard_streams import STANDARD
 
 
-@command("Write a report on a drive to a file.", statuses=ON_LINE)
+@command("Write a report on a drive to a file.", group="Watch", statuses=ON_LINE)
 @line_argument
 @file_argument
 @force_option
@@ -25,7 +26,7 @@ from ..shared.sets import (
 @settings_options
 @never_forced
 def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
-    """Write a report on a drive to FILE, as Markdown.
+    """Write a report on a drive to FILE, as Markdown; `-` is standard output.
 
     It has identification, line settings, settings changed from the factory, control source,
     scanner, reaction to a communication loss, faults, and writes by Drive Panel.
@@ -37,14 +38,14 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     from ..documents.setting_documents import ReportDocument
     from ..shared.output import drive_fields, print_json
 
-    refuse_existing(file, force=force)
+    refuse_output(file, force=force, as_json=as_json)
     try:
         session, values = set_of_drive(target)
     except KeyboardInterrupt:
         raise Failure("Ended by Ctrl-C: nothing was written.", INTERRUPTED) from None
     entries = entries_of(Journal(), session.line_text, target.device)
     write_down(file, text_of(session.profile, values, entries), force=force)
-    messages = Messages(as_json=as_json)
+    messages = Messages(as_json=as_json or file == STANDARD)
     messages.tell(f"{file}: report on {session.profile.name} at address {target.device}")
     if as_json:
         print_json(

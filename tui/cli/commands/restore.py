@@ -76,7 +76,7 @@ CODES_NAMED = 12
 """Number of codes named for one reason; --dry-run names all."""
 
 
-@command("Restore a parameter set to a drive.", statuses=WRITING, acts=True)
+@command("Restore a parameter set to a drive.", group="Set up", statuses=WRITING, acts=True)
 @line_argument
 @file_argument
 @dry_run_option
@@ -219,7 +219,7 @@ def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> No
             left.setdefault(item.text, []).append(item)
     for text, same in left.items():
         if len(same) > ALIKE:
-            values = f"{len(same)} {', '.join(item.code for item in same)}"
+            values = f"{len(same)} {first_of([item.code for item in same], CODES_NAMED)}"
         else:
             values = ", ".join(f"{item.code} {item.new}".rstrip() for item in same)
         messages.tell(f"leave  {values}: {text}")
@@ -244,12 +244,20 @@ async def _restore(
     *,
     save: bool,
 ) -> tuple[_Restored, int]:
+    from tui.bus.errors import RequestRefused
     from tui.drive.profile import library
     from tui.session.settings.eeprom import save_to_eeprom
-    from tui.session.settings.restore import Mark
+    from tui.session.settings.restore import Mark, plan_for
     from tui.session.settings.restore import restore_set as bring_back
 
     source, messages = library.load(values.head.profile), telling.messages
+    if session.line.read_only:
+        plan = await plan_for(session, values, source, options, counter("Read"))
+        if len(plan.edits) or save:
+            raise RequestRefused("The line is read-only: nothing is written.")
+        say_plan_left_out(plan, messages)
+        messages.tell(_WROTE_NOTHING.format(left=0))
+        return _restored(plan), DONE
     if interrupted_before := Mark.of(session).interrupted:
         messages.tell(interrupted_before)
     journal, permit = journal_document(), permit_of(session)

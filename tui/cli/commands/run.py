@@ -125,7 +125,7 @@ class RunTelling:
         self._say(json_text(document))
 
 
-@command("Run a motor until this command ends.", statuses=WRITING, acts=True)
+@command("Run a motor until this command ends.", group="Run", statuses=WRITING, acts=True)
 @line_argument
 @drive_options
 @click.option("--reverse", is_flag=True, help="Run reverse.")

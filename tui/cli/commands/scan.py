@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 ALL_ADDRESSES = "1-247"
 
 
-@command("Scan a line for drives.", statuses=ON_LINE)
+@command("Scan a line for drives.", group="Troubleshoot", statuses=ON_LINE)
 @line_argument
 @click.option(
     "--addresses",

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..documents.other_documents import ServeReady
 
 
-@command("Run headless and serve lines over Modbus TCP.", statuses=ON_LINE)
+@command("Run headless and serve lines over Modbus TCP.", group="Share", statuses=ON_LINE)
 @click.argument("lines", nargs=-1, metavar="LINE...", shell_complete=complete_line)
 @line_options
 @click.option("--tcp", metavar="HOST:PORT", help="Serve Modbus TCP (default host: loopback).")

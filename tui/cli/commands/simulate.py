@@ -28,7 +28,7 @@ USUAL = (19200, "8E1")
 """Baud and format of a LINE that names none."""
 
 
-@command("Serve simulated drives to any Modbus client.")
+@command("Serve simulated drives to any Modbus client.", group="Profiles")
 @click.argument(
     "drives",
     nargs=-1,

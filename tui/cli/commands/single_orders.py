@@ -72,7 +72,7 @@ def _ordered(
         print_json(CommandDocument(command=command, **fields, text=text, messages=messages.texts))
 
 
-@command("Set a drive's reference.", statuses=WRITING, acts=True)
+@command("Set a drive's reference.", group="Run", statuses=WRITING, acts=True)
 @line_argument
 @click.argument("text", metavar="REFERENCE")
 @drive_options
@@ -99,6 +99,7 @@ def reference(
 
 @command(
     "Reset a drive's fault.",
+    group="Run",
     statuses=WRITING,
     acts=True,
     help=f"Reset a drive's fault. Its cause must be removed first.\n\n{MAY_START}",

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from ..documents.drive_documents import StatusDocument
 
 
-@command("Show a drive's state, control source and fault.", statuses=ON_LINE)
+@command("Show a drive's state, control source and fault.", group="Watch", statuses=ON_LINE)
 @takes_line_as(FirstOfLines, "LINE")
 @click.argument("more", nargs=-1, metavar="[LINE...]", shell_complete=complete_line)
 @drives_options

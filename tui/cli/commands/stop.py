@@ -48,7 +48,7 @@ NAMES_NO_FAMILY = (
 )
 
 
-@command("Stop one drive, or every drive on a line.", statuses=WRITING, acts=True)
+@command("Stop one drive, or every drive on a line.", group="Run", statuses=WRITING, acts=True)
 @line_argument
 @drives_options
 @click.option("--all", "every", is_flag=True, help="Stop every drive found on the line.")

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 @command(
     "Learn a raw value's scale from the drive's display.",
+    group="Profiles",
     statuses=(DIFFERENT, *ON_LINE),
     acts=True,
     context_settings={"ignore_unknown_options": True},

@@ -87,7 +87,7 @@ class CsvOptions:
         return CsvOutput(self.file, units, several)
 
 
-@command("Poll parameters and print every cycle.", statuses=ON_LINE)
+@command("Poll parameters and print every cycle.", group="Watch", statuses=ON_LINE)
 @lines_argument
 @click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
 @drives_options

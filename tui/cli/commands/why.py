@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from ..documents.document import DriveFields
 
 
-@command("Diagnose why a drive does not answer.", statuses=ON_LINE)
+@command("Diagnose why a drive does not answer.", group="Troubleshoot", statuses=ON_LINE)
 @line_argument
 @settings_options
 @read_only_option

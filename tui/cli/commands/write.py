@@ -57,7 +57,7 @@ class _Written(TypedDict):
     unsaved: list[str]
 
 
-@command("Write settings to a drive.", statuses=WRITING, acts=True)
+@command("Write settings to a drive.", group="Set up", statuses=WRITING, acts=True)
 @line_argument
 @click.argument(
     "wanted",
@@ -208,6 +208,8 @@ async def _write(
     messages = telling.messages
     if not len(edits):
         messages.tell("The drive holds these values already.")
+        if session.line.read_only and not save:
+            return {"results": [], "saved": False, "after_reset": [], "unsaved": []}, DONE
     journal, permit = journal_document(), permit_of(session)
     try:
         done = await apply_edits(

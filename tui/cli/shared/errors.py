@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 DONE, DIFFERENT, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE, ENDED_AFTER_WRITING = range(7)
 OWN_ERROR = 70
+OUTPUT_LOST = 74
+"""Standard output cannot be written: the disk is full, for example."""
 INTERRUPTED = 130
 NOTHING_SENT = (USAGE, REFUSED_HERE)
 """Statuses that promise that nothing was written."""
@@ -81,6 +83,7 @@ def status_of(error: Exception) -> int | None:
     from tui.bus.errors import DeviceException, LineError, LinkSyntaxError, RequestRefused
     from tui.drive.errors import (
         DriveError,
+        NotAValue,
         ProfileError,
         UnitRefused,
         UnknownParameter,
@@ -97,6 +100,7 @@ def status_of(error: Exception) -> int | None:
         (UnknownParameter, USAGE),
         (ProfileError, USAGE),
         (UnitRefused, USAGE),
+        (NotAValue, USAGE),
         (SimulatorError, USAGE),
         (RequestRefused, REFUSED_HERE),
         (NotTaken, DRIVE_REFUSED),
@@ -118,7 +122,7 @@ def _tell_lost_output(*, acts: bool) -> None:
     if lost := output_lost():
         text = f"What was printed is lost: standard output cannot be written: {lost}."
         if not acts:
-            raise Failure(text, OWN_ERROR)
+            raise Failure(text, OUTPUT_LOST)
         say(f"drivepanel: {text}", err=True)
 
 

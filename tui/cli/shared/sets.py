@@ -7,6 +7,7 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -24,6 +25,7 @@ from .errors import (
 )
 from .options import Target, connect_drive, on_line
 from .say import Messages, say_over
+from .standard_streams import STANDARD, given_file
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edit
@@ -70,24 +72,38 @@ def set_in(path: Path) -> ParameterSet:
     from tui.drive.settings.set_file import read_set
 
     try:
-        return read_set(path)
+        return read_set(given_file(path))
     except SetError as error:
         raise Failure(str(error), USAGE) from error
 
 
-def refuse_existing(file: Path, *, force: bool) -> None:
-    """Raise Failure with status 2 where a file would be lost; asked before the line is opened."""
-    if file.exists() and not force:
+def refuse_output(file: Path, *, force: bool, as_json: bool) -> None:
+    """Raise an error with status 2 if a file would be lost, or output mixed.
+
+    It is checked before the line is opened.
+    """
+    if file == STANDARD:
+        if as_json:
+            raise click.UsageError("Either - or --json: both write to standard output.")
+    elif file.exists() and not force:
         raise Failure(f"{file} already exists. Choose another name or use --force.", USAGE)
 
 
 def write_down(
     file: Path, content: str | bytes, *, force: bool = False, private: bool = False
 ) -> None:
-    """Write a file whole or not at all; raises Failure with status 2 where that cannot be."""
+    """Write a file completely or not at all, or to standard output.
+
+    Raises Failure with status 2 if the file cannot be written.
+    """
     from tui.drive.settings.parameter_set import SetError
     from tui.drive.settings.set_file import write_file
 
+    if file == STANDARD:
+        sys.stdout.flush()
+        sys.stdout.buffer.write(content.encode() if isinstance(content, str) else content)
+        sys.stdout.buffer.flush()
+        return
     try:
         write_file(file, content, force=force, private=private)
     except SetError as error:
@@ -118,7 +134,10 @@ def set_of_drive(
 
     async def work(opened: OpenLine) -> tuple[DriveSession, ParameterSet]:
         session = await connect_drive(opened, target)
-        return session, await take_set(session, settings_only=settings_only)
+        values = await take_set(session, settings_only=settings_only)
+        if opened.simulation is not None:  # its port is a temporary one
+            values = replace(values, head=replace(values.head, line=opened.text))
+        return session, values
 
     return on_line(target, work, read_only=True)
 

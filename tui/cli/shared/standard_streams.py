@@ -9,7 +9,11 @@ from __future__ import annotations
 import io
 import os
 import sys
+from pathlib import Path
 from typing import Any, TextIO
+
+STANDARD = Path("-")
+"""In place of a file: standard input, or standard output."""
 
 
 class ForgivingFile(io.FileIO):
@@ -63,3 +67,12 @@ def output_lost() -> str:
     file = getattr(getattr(sys.stdout, "buffer", None), "raw", None)
     lost = file.lost if isinstance(file, ForgivingFile) else None
     return "" if lost is None else lost.strerror or str(lost)
+
+
+def given_file(path: Path) -> Path:
+    """Return the path of a file to read; with `-`, standard input is read now."""
+    from tui.drive.small_file import LONGEST_TEXT, supplied
+
+    if path == STANDARD and path not in supplied:
+        supplied[path] = sys.stdin.buffer.read(LONGEST_TEXT + 1)
+    return path

@@ -13,6 +13,7 @@ from tui.bus.api import ModbusLine, Priority
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 
+from ..connect.addresses import FIRST, LAST
 from ..connect.contradiction import Contradiction, own_words
 from ..connect.identify import DriveIdentity, identify_drive
 from ..connect.known_line import KnownLine
@@ -78,6 +79,10 @@ class LineCalls:
 
     async def drive(self, address: int, profile: str | None) -> DriveCalls:
         """Find a drive and keep polling it. Raises as `DriveLine.drive`."""
+        if not isinstance(address, int) or not FIRST <= address <= LAST:
+            raise DriveError(
+                f"{address!r} cannot be the address of a drive: use {FIRST} to {LAST}."
+            )
         session = await self._session(address, profile)
         await asyncio.to_thread(Teacher(session).recall)
         return DriveCalls(self.fleet.take(session), self.fleet, self._runs)
@@ -139,9 +144,10 @@ class DriveLine(ScriptedLine):
     """An open line. Taken drives are kept polled until it is closed."""
 
     def drive(self, address: int = 1, profile: str | None = None) -> Drive:
-        """The drive at an address, by its own word for what it is, or by a profile's id.
+        """Return the drive at an address (1 to 247), by its identification or by a profile's ID.
 
-        Raises DriveError where it does not say what it is, or says that it is another.
+        Raises DriveError for another address, and if the drive does not identify itself, or as
+        another one; UnknownProfile; and the line's errors.
         """
         return Drive(waited(self._calls.line, lambda: self._calls.drive(address, profile)))
 
