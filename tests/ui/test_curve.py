@@ -13,8 +13,11 @@ from hypothesis import strategies as st
 from rich.style import Style
 from rich.text import Text
 
+from tui.bus.api import DeviceCounters, LineCounters
+from tui.bus.model import LastMinute
 from tui.drive.profile import library
 from tui.screens.monitor.arrange import arrange
+from tui.screens.monitor.assembly import monitor_parts, watched_words
 from tui.screens.monitor.curves import clock_text, curve_lines
 from tui.screens.monitor.time_axis import MARK_SIGNS
 from tui.screens.monitor.time_cursor import TimeCursor
@@ -302,6 +305,22 @@ def test_cursor_on_a_mark_names_the_program_that_caused_it(size: tuple[int, int]
         assert rows[-1].cell_len <= size[0]
         other = curve_lines(replace(view, cursor=at - 5.0), room)[-1].plain
         assert by[0] not in other
+
+
+def test_low_bandwidth_refresh_at_rest_changes_only_the_curve() -> None:
+    """Counts of answers, seconds of the extremes and the end of the axis would always change."""
+    room, base = arrange(80, 24, 9, lean=True), view_of(ATV71, fakes.RUNNING)
+    rows = []
+    for good in (100, 180):
+        point = TrendPoint(fakes.NOW - 3 + good / 100, (50.0, 8.4, 50.0))
+        counts = DeviceCounters(minute=LastMinute(good=good))
+        view = replace(base, counters=LineCounters(devices={base.device: counts}), lean=True)
+        view = replace(view, trend=(TrendPoint(fakes.NOW - 10, (50.0, 8.4, 50.0)), point))
+        rows.append(monitor_parts(view, room, watched_words(ATV71)))
+    assert {place for place in rows[0] if rows[0][place] != rows[1][place]} == {"curve"}
+    assert "100 % in 60 s" in rows[0]["state"][-1].plain
+    early, late = (replace(running_view(now, 30.0), lean=True) for now in (1001.0, 1003.0))
+    assert curve_lines(early, room)[-2:] == curve_lines(late, room)[-2:]
 
 
 def test_mark_without_a_known_cause_claims_none() -> None:

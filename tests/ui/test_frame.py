@@ -193,6 +193,7 @@ async def test_slow_link_draws_values_rarely_and_a_trip_immediately(
 ) -> None:
     async with panel() as made:
         drawn: list[FrameView] = []
+        within: list[int] = []
         made.app.low_bandwidth = True
         monkeypatch.setattr(made.app.screen, "draw_frame", drawn.append)
         values = itertools.count()
@@ -204,9 +205,11 @@ async def test_slow_link_draws_values_rarely_and_a_trip_immediately(
             return view._replace(strip=view.strip._replace(drive=drive))
 
         monkeypatch.setattr(made.app._frame, "view", trembling)
+        monkeypatch.setattr(made.app.screen, "look", lambda: within.append(len(drawn)))
         for _ in range(50):
             made.app.draw_frame()
         assert len(drawn) <= 1
+        assert within == list(range(1, len(drawn) + 1)), "the screen is drawn with its frame"
         view = view._replace(strip=view.strip._replace(faults=1, unseen=True))
         made.app.draw_frame()
         assert drawn[-1].strip.faults == 1

@@ -15,7 +15,7 @@ from tui.terminal.fields import takes_space, takes_text
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
-from .frame import SELDOM, Framed
+from .frame import Framed
 from .keys.table import elsewhere, keys_line, opening_line, typing_line
 
 
@@ -46,9 +46,9 @@ class PanelScreen(Framed):
         raise NotImplementedError
 
     def on_mount(self) -> None:
-        """Start the regular refresh."""
-        if self.LOOK is not None:
-            self.set_interval(SELDOM if self.app.low_bandwidth else self.LOOK, self.look)
+        """Start the regular refresh; on a low-bandwidth link the refresh of the frame does it."""
+        if self.LOOK is not None and not self.app.low_bandwidth:
+            self.set_interval(self.LOOK, self.look)
 
     def on_resize(self, event: Resize) -> None:
         """Refresh for the new size."""

@@ -152,6 +152,9 @@ class Framed(Screen[Any]):
         if text := once_closed(self.app.place, event.key, event.character):
             self.app.tell(text)
 
+    def look(self) -> None:
+        """Show the present contents within the frame; a dialog has none that change."""
+
     def draw_frame(self, view: FrameView) -> None:
         """Show the frame's present contents; unchanged parts are not drawn."""
         if not self.size.width:

@@ -82,6 +82,8 @@ class StatusRefresher(Panel):
             return
         self._drawn, self._drawn_at = drawn, now
         self.screen.draw_frame(view)
+        if self.low_bandwidth and self.screen.is_mounted:
+            self.screen.look()  # both in one output
 
     def _judge_lines(self) -> None:
         """Report once each trouble in the last minute of a line, and its end."""

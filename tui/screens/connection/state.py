@@ -21,7 +21,6 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, KEY, PLAIN, STRONG
 
 from ..base import PanelScreen
-from ..frame import SELDOM
 from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines, hint_for
 from .choices import LIST_MARKS, ListMark
 from .drive_list import DriveList
@@ -132,7 +131,8 @@ class LineView(PanelScreen):
             self.app.events.add(ALARM_KIND, fault)
         self.lines.fill(self.app.line_text, self.app.open_texts)
         self.form.offer_settings(self.lines.chosen)
-        self._looking = [self.set_interval(SELDOM if self.app.low_bandwidth else STATES, self.look)]
+        if not self.app.low_bandwidth:  # there the refresh of the frame does it
+            self._looking = [self.set_interval(STATES, self.look)]
 
     def on_resize(self, event: Resize) -> None:
         """Redraw at the new width, and again after the layout has settled."""

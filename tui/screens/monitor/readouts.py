@@ -175,8 +175,8 @@ def _heading(
 def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[Text]:
     """Return the extremes on the page of the curve, and the seconds from its first to last value.
 
-    A page that has just turned covers less than its span. The rows are empty if the trend lacks
-    the quantity.
+    A page that has just turned covers less than its span. A low-bandwidth link gets no seconds.
+    The rows are empty if the trend lacks the quantity.
     """
     if quantity not in TREND_QUANTITIES or parameter is None or view.page is not None:
         return [Text()] * ROWS  # the cursor may hold an older page than the number beside them
@@ -192,7 +192,7 @@ def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[T
     digits = decimal_places(parameter)
     seen = [value for point in page if (value := point.values[place]) is not None]
     highest, lowest = max(seen), min(seen)
-    covered = f"{page[-1].time - page[0].time:.0f} s"
+    covered = "" if view.lean else f"{page[-1].time - page[0].time:.0f} s"
     return [
         Text("max", FAINT).append(f"{highest:>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),
         Text("min", FAINT).append(f"{lowest:>{SIDE_CELLS - 4}.{digits}f} ", PLAIN),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from decimal import Decimal, InvalidOperation
 from typing import TYPE_CHECKING, ClassVar
@@ -23,7 +22,6 @@ from tui.widgets.palette import ATTENTION, FAINT, STALE, STRONG
 from tui.widgets.strip import FrameView
 
 from ..command.control import Control
-from ..frame import SELDOM
 from ..keys.action import MONITOR
 from ..keys.table import bindings, keys_line
 from ..state_words import stands_by
@@ -89,7 +87,6 @@ class MonitorScreen(CursorKeys):
         self._still: Timer | None = None
         self._reported: object = None
         """Urgent parts of the snapshot that was shown last."""
-        self._looked_at = -math.inf
         self._bottom_rows = 0
         self._placed: tuple[Arrangement, int, int] | None = None
 
@@ -110,11 +107,11 @@ class MonitorScreen(CursorKeys):
         self._timer = self.set_interval(REFRESH, self._look_in_time)
 
     def _look_in_time(self) -> None:
-        """Refresh the screen; on a low-bandwidth link figures wait up to SELDOM seconds.
+        """Refresh the screen; on a low-bandwidth link figures wait for the refresh of the frame.
 
         A new state, fault or error, and additional values, are shown immediately.
         """
-        snapshot, now = self.console.monitor.latest, self.app.clock.monotonic()
+        snapshot = self.console.monitor.latest
         reported = snapshot and (
             snapshot.state.kind,
             snapshot.state.headline,
@@ -124,9 +121,9 @@ class MonitorScreen(CursorKeys):
         )
         if reported != self._reported:
             self.app.hurry()
-        elif self.app.low_bandwidth and now < self._looked_at + SELDOM:
+        elif self.app.low_bandwidth:
             return
-        self._reported, self._looked_at = reported, now
+        self._reported = reported
         self.look()
 
     def on_unmount(self) -> None:
@@ -309,6 +306,7 @@ class ViewSource:
             stands_by=snapshot is not None and stands_by(console.session, snapshot.state),
             fault_at=self._fault_at(),
             word=word,
+            lean=app.low_bandwidth,
             me=session.line.facts.me.text,
         )
 

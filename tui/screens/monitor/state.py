@@ -240,10 +240,13 @@ def _answers(view: View, width: int) -> Text:
     """Return the row with this drive's good answers to requests of the last 60 s.
 
     They are those to every program on the line. Requests that it did not answer count too.
+    On a low-bandwidth link the row has their share, as the numbers change in each refresh.
     """
     drive = view.counters.devices.get(view.device, DeviceCounters()).minute
     share, requests = drive.whole_share, drive.replies + drive.silent
     text = f"{drive.good}/{requests} in 60 s"
+    if view.lean and share is not None:
+        text = f"{math.floor(100 * share)} % in 60 s"
     label = "Drive answers" if len(f"Drive answers {text:<15}") <= width else "Answers"
     if share is None:
         return _pair(label, NOT_AVAILABLE, FAINT, width)

@@ -141,10 +141,13 @@ def mark_names(page: ShownPage, rows: int) -> dict[TrendMark, MarkName]:
 
 
 def axis_lines(page: ShownPage, rows: int, names: Mapping[TrendMark, MarkName]) -> list[Text]:
-    """Return the time axis up to now with its marks, and the clock times below or on it."""
+    """Return the time axis up to now with its marks, and the clock times below or on it.
+
+    On a low-bandwidth link the axis is complete: its end would move with each refresh.
+    """
     view, columns, plot = page.view, page.columns, page.plot(1, CurveScale(0, 1))
     ticks = ticks_of(page)
-    reached = plot.column(view.now) if view.now < plot.end else columns
+    reached = plot.column(view.now) if view.now < plot.end and not view.lean else columns
     reached = -1 if reached is None else reached
     cells = [("─" if column <= reached else " ", FAINT) for column in range(columns)]
     end = max((name.column + len(name.text) for name in names.values()), default=0)

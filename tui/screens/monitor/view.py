@@ -72,6 +72,8 @@ class View:
     """Time of the trip, or of the fault's first read, as text; empty if unknown."""
     word: int | None = None
     """Index of the table shown instead of the curve; None for the curve."""
+    lean: bool = False
+    """True on a low-bandwidth link: few parts change with each refresh."""
     me: str = ""
     """Name of this program among those on the line."""
 
