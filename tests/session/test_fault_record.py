@@ -44,6 +44,11 @@ async def test_trip_records_values_and_writes_of_the_preceding_seconds() -> None
         speeds = [float(m.texts[at]) for m in record.moments if m.state == "running forward"]
         assert speeds[0] < speeds[-1]
         assert speeds[-1] > 1
+        assert [point.time for point in record.points] == [m.time for m in record.moments]
+        run = [p.values[0] for p, m in zip(record.points, record.moments, strict=True)
+               if m.state == "running forward"]  # fmt: skip
+        assert run == speeds
+        assert record.period > 0
         commands = [e.new for e in record.writes if e.code == "CMD"]
         assert commands == ["16#0006", "16#000F"]
         assert record.moments[-1].state == "fault ObF"

@@ -17,6 +17,7 @@ from tui.session.command.stop_report import Phase, StopReport, StopSummary
 from tui.session.fleet import FoundDrive
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment, Recorder
+from tui.session.monitor.trend import TrendPoint
 from tui.session.work import Outcome, OutcomeKind
 from tui.terminal.abilities import EVERYTHING, Abilities
 
@@ -114,7 +115,11 @@ def trip() -> FaultRecord:
     )  # fmt: skip
     before = fakes.readings_of(profile, {**fakes.RUNNING, "HMIS": 6}, fakes.NOW - 20)
     fault = profile.fault(18)
-    return FaultRecord(0.0, wall, fault, codes, headings, (*moments, end), (entry,), before)
+    points = [TrendPoint(-0.5 * n, (50.0 - n, 8.4, 50.0)) for n in range(20, 0, -1)]
+    return FaultRecord(
+        0.0, wall, fault, codes, headings, (*moments, end), (entry,), before,
+        (*points, TrendPoint(0.0, (0.0, 0.0, 50.0))), 0.5,
+    )  # fmt: skip
 
 
 def panel(name: str, abilities: Abilities = EVERYTHING) -> tuple[Any, MonitorScreen]:

@@ -23,6 +23,7 @@ from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord
 from tui.session.monitor.trend import TrendPoint
 from tui.session.monitor.watched import SeenTrip, Watched
+from tui.widgets.curve import ASCII_SIGNS, BRAILLE, CurveSigns
 
 from .test_frame import panel
 
@@ -302,6 +303,57 @@ def test_values_at_the_trip_and_now_are_in_two_columns() -> None:
     assert rows["LCR"] == ["2.9", "A", "0.0", "A"], "what the drive stored precedes"
     assert rows["OTR"] == ["~-94.0", "%", "0.0", "%"]
     assert rows["DEC"][-2:] == ["0.5", "s"]
+
+
+def tripped(seconds: float, *, signs: CurveSigns = BRAILLE) -> DoctorView:
+    """A trip of a motor at 40 Hz and 5 A that was read for some seconds before it."""
+    count = round(seconds / 0.5)
+    points = [TrendPoint(100.0 - n / 2, (40.0, 5.0, 40.0)) for n in range(count, -1, -1)]
+    found = replace(record(ULN=2282), time=100.0, wall=1e9, points=tuple(points), period=0.5)
+    read = readings_of(ATV71, BRAKING, NOW)
+    return view(18, record=found, readings=read, now=NOW, signs=signs)
+
+
+@pytest.mark.parametrize("width", [80, 120, 200])
+@pytest.mark.parametrize("seconds", [4.0, 10.0, 29.0])
+def test_curves_end_with_the_trip_and_begin_with_the_first_value(
+    width: int, seconds: float
+) -> None:
+    shown = tripped(seconds)
+    rows = [line.plain for line in doctor_lines(shown, width, 24)]
+    top = next(at for at, row in enumerate(rows) if "the 10 s before it" in row)
+    axis = next(at for at, row in enumerate(rows) if at > top and "└" in row)
+    assert all(len(row) <= width for row in rows)
+    trip, corner = rows[axis].index("■"), rows[axis].index("└")
+    lit = re.compile("[\u2801-\u28ff]")
+    cells = [at for row in rows[top + 1 : axis] for at in (m.start() for m in lit.finditer(row))]
+    assert max(cells) == trip
+    columns = trip - corner
+    missing = max(0.0, 1 - seconds / 10) * columns
+    assert abs(min(cells) - corner - 1 - missing) <= 1
+    units = [row.rstrip()[-2:] for row in rows[top + 1 : axis] if not row.endswith("    ")]
+    assert [unit.strip() for unit in units] == ["Hz", "A"]
+
+
+def test_trip_without_curves_or_room_for_them_leaves_the_width_to_the_names() -> None:
+    full = "Ramp adapted to the bus voltage"
+    assert full not in reported(tripped(10.0))
+    for shown, width, height in (
+        (view(18, record=record(), now=NOW), 80, 20),
+        (tripped(0.0), 80, 20),
+        (tripped(10.0), 79, 20),
+        (tripped(10.0), 80, 13),
+    ):
+        text = reported(shown, width, height)
+        assert "before it" not in text
+        assert full in text or height == 13
+
+
+def test_curves_of_a_plain_terminal_are_ascii() -> None:
+    rows = [line.plain for line in doctor_lines(tripped(10.0, signs=ASCII_SIGNS), 80, 20)]
+    top = next(at for at, row in enumerate(rows) if "before it" in row)
+    assert re.search(r"[-_\"]{5}", rows[top + 1])
+    assert not re.search("[\u2800-\u28ff]", "".join(rows))
 
 
 def test_value_long_before_the_trip_shows_its_age_and_is_no_evidence() -> None:

@@ -74,9 +74,13 @@ BLOCKS = CurveSigns(1, 2, " ▄▀█", " ▄▀█", "·", "│")
 ASCII_SIGNS = CurveSigns(1, 3, ' _-|"|||', " .=:':::", " ", "!")
 
 
-def curve_signs(*, plain: bool, braille: bool) -> CurveSigns:
-    """Return the characters for a terminal; `plain` means ASCII only."""
-    return ASCII_SIGNS if plain else BRAILLE if braille else BLOCKS
+def curve_signs(*, plain: bool, braille: bool, colored: bool = True) -> CurveSigns:
+    """Return the characters for a terminal; `plain` means ASCII only.
+
+    Without colors there is no grid: it would look like part of a curve.
+    """
+    signs = ASCII_SIGNS if plain else BRAILLE if braille else BLOCKS
+    return signs if colored else signs._replace(grid=" ")
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from .next_steps import (
 )
 from .parts import ago_text
 from .quiet import quiet_rows
+from .trip_curve import LEAST_ROWS, trip_curve_lines, trip_curve_width
 from .value_rows import value_rows
 
 TIME = "%H:%M:%S"
@@ -38,13 +39,25 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
 
     The text of a reset is whole or absent: a sentence then asks for a larger terminal.
     """
+    lines, values = _page(view, width, height, width)
+    if (cells := trip_curve_width(view, width)) and len(values) >= LEAST_ROWS:
+        lines, values = _page(view, width, height, width - cells - 1)
+        for row, curve in zip(values, trip_curve_lines(view, cells, len(values)), strict=True):
+            row.pad_right(1)  # all rows of values have the same width
+            row.append_text(curve)
+    return lines
+
+
+def _page(view: DoctorView, width: int, height: int, beside: int) -> tuple[list[Text], list[Text]]:
+    """Return the whole page, and of it the rows of values, which have `beside` columns."""
     reset = reset_rows(view, width)
     if len(reset) > height - 1:
         reset = [Text(f"  {cut_at_word(TOO_FEW, max(10, width - 2))}", PLAIN)]
+    values: list[Text] = []
     if view.is_quiet:
         parts = [[_headline(view, width)], *quiet_rows(view, width)]
     else:
-        values = value_rows(view, width)
+        values = value_rows(view, beside)
         parts = [[_headline(view, width)], *cause_rows(view, width), values]
         parts += [next_heading(view, width), check_rows(view, width), open_row(view, width)]
         parts += [reset, written_row(view, width), record_row(view, width)]
@@ -52,7 +65,7 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
     _shorten(view, parts, sum(map(len, parts)) + least - height)
     lines = [line for part in _spaced(view, parts, height - shown_count(view)) for line in part]
     lines = lines[:height]
-    return lines + history_rows(view, width, height - len(lines))
+    return lines + history_rows(view, width, height - len(lines)), values
 
 
 def _shorten(view: DoctorView, parts: list[list[Text]], lines: int) -> None:

@@ -15,6 +15,7 @@ from tui.session.monitor.alarms import PresentFault
 from tui.session.monitor.fault_record import FaultRecord
 from tui.session.monitor.watched import Watched
 from tui.session.shown import Quality, Shown
+from tui.widgets.curve import BRAILLE, CurveSigns
 
 FAULT_QUANTITIES: Sequence[Quantity] = (
     "output_frequency",
@@ -79,6 +80,8 @@ class DoctorView:
     """Why the drive cannot be armed; empty if it can."""
     watched: Watched | None = None
     """Monitoring of the drive so far, for one without a fault."""
+    signs: CurveSigns = BRAILLE
+    """Characters for curves that the terminal can show."""
 
     @property
     def help(self) -> FaultHelp | None:

@@ -20,6 +20,7 @@ from tui.session.monitor.fault_record import FaultRecord, Recorder, record_name,
 from tui.session.monitor.watched import SeenTrip, Watched, last_trip
 from tui.session.paths import state_folder
 from tui.session.shown import Shown
+from tui.widgets.curve import curve_signs
 from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 
@@ -181,6 +182,11 @@ class FaultsScreen(OrderKeys):
             wall=self.app.clock.wall(),
             armed=self.session.arming.armed,
             barred=self.session.arming.hindrance,
+            signs=curve_signs(
+                plain=self.app.plain_signs,
+                braille=self.app.has_braille,
+                colored=self.app.has_colors,
+            ),
         )
         return replace(view, watched=self._watched()) if view.is_quiet else view
 

@@ -93,8 +93,7 @@ class View:
     @property
     def signs(self) -> CurveSigns:
         """Characters for curves that the terminal can show."""
-        signs = curve_signs(plain=self.plain, braille=self.braille)
-        return signs if self.colored else signs._replace(grid=" ")
+        return curve_signs(plain=self.plain, braille=self.braille, colored=self.colored)
 
     @property
     def page_start(self) -> float:

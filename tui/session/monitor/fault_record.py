@@ -21,6 +21,7 @@ from ..drive import DriveSession
 from ..journal import Entry, Journal
 from ..shown import Quality, Shown
 from .snapshot import Snapshot
+from .trend import TrendPoint, trend_codes, trend_values
 
 SECONDS_KEPT = 30.0
 """Seconds before a trip that are kept."""
@@ -54,6 +55,10 @@ class FaultRecord:
     """Writes to the drive in these seconds, oldest first."""
     before: Mapping[str, Shown] = field(default_factory=dict)
     """Last values before the trip, by code, also those of the slow rate."""
+    points: tuple[TrendPoint, ...] = ()
+    """Curves of these seconds, oldest first; the last point is the trip."""
+    period: float = 0.0
+    """Seconds from one cycle to the next at the trip."""
 
     @property
     def raws(self) -> dict[str, int]:
@@ -118,9 +123,12 @@ class Recorder:
         )
         earlier = [snapshot for snapshot, _ in self._moments if snapshot is not now]
         before = earlier[-1].readings if earlier else {}
+        curve = trend_codes(profile)
+        points = tuple(TrendPoint(s.time, trend_values(curve, s)) for s, _ in self._moments)
         return FaultRecord(
-            now.time, now.wall, now.state.fault, codes, headings, moments, writes, before
-        )
+            now.time, now.wall, now.state.fault, codes, headings, moments, writes, before,
+            points, now.period,
+        )  # fmt: skip
 
     def acknowledge(self) -> None:
         """Note that a person has viewed the record."""

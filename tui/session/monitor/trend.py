@@ -91,14 +91,31 @@ def readout_parameter(profile: Profile, quantity: Quantity) -> Parameter | None:
     return next((p for p in watched if p.name.casefold() in names), None)
 
 
+def trend_codes(profile: Profile) -> list[str | None]:
+    """Return the code of each of TREND_QUANTITIES; None for one that the profile lacks."""
+    found = (readout_parameter(profile, quantity) for quantity in TREND_QUANTITIES)
+    return [parameter.code if parameter else None for parameter in found]
+
+
+def trend_values(codes: Iterable[str | None], cycle: TrendCycle) -> tuple[float | None, ...]:
+    """Return the values of codes in a cycle; None for each that was not read."""
+    state = None if cycle.error else cycle.state
+    readings = with_text(cycle.readings)
+    return tuple(
+        trend_value(readings[code], state)
+        if code and code in readings and state is not None
+        else None
+        for code in codes
+    )
+
+
 class Trend:
     """Keeps TREND_QUANTITIES of one drive for TREND_SECONDS."""
 
     def __init__(self, profile: Profile, points: Iterable[TrendPoint] = ()) -> None:
         self._profile = profile
         self._points = deque(points)
-        found = (readout_parameter(profile, quantity) for quantity in TREND_QUANTITIES)
-        self._codes = [parameter.code if parameter else None for parameter in found]
+        self._codes = trend_codes(profile)
         self._marker = TrendMarker()
 
     @property
@@ -144,14 +161,7 @@ class Trend:
 
     def add(self, cycle: TrendCycle) -> TrendPoint:
         """Add a cycle; a failed cycle leaves a gap, never a repeated value."""
-        state = None if cycle.error else cycle.state
-        readings = with_text(cycle.readings)
-        values = tuple(
-            trend_value(readings[code], state)
-            if code and code in readings and state is not None
-            else None
-            for code in self._codes
-        )
+        values = trend_values(self._codes, cycle)
         mark, by, codes = self._marker.mark(cycle, values[REFERENCE_PLACE])
         point = TrendPoint(cycle.time, values, mark, by, codes)
         self._points.append(point)
