@@ -191,6 +191,24 @@ def test_time_passes_only_while_the_line_runs() -> None:
     assert on.drive(2).motor.frequency == pytest.approx(10, abs=0.1)
 
 
+def test_request_costs_steps_of_the_addressed_drive_alone(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [100.0]
+    drives = [SimulatedDrive(PROFILES["atv71"], DriveSpec("atv71", a)) for a in range(1, 32)]
+    on = SimulatedLine(drives, LineTiming(), lambda: now[0])
+    on.start()
+    stepped: list[tuple[int, float]] = []
+    monkeypatch.setattr(
+        SimulatedDrive, "step", lambda drive, dt: stepped.append((drive.address, dt))
+    )
+    now[0] += 0.5
+    assert requested(on, 7, read(3201)) is not None
+    assert stepped == [(7, 0.5)]
+    on.advance()
+    assert sorted(stepped) == [(address, 0.5) for address in range(1, 32)]
+
+
 def test_turnaround_comes_from_the_profile_or_the_drive_delay() -> None:
     on = line(DriveSpec("atv71", 2), DriveSpec("powerdrive", 3))
     assert on.drive(2).station.turnaround == pytest.approx(0.005)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
@@ -92,8 +93,13 @@ class Simulation:
             self._ticker.start()
 
     def _tick(self) -> None:
-        while not self._stopping.wait(TICK):
-            self.line.advance()
+        # one drive at a time: a request that comes then waits for one step at most
+        count = len(self.drives)
+        for place in itertools.cycle(range(max(1, count))):
+            if self._stopping.wait(TICK / max(1, count)):
+                return
+            if count:
+                self.line.advance_drive(place)
 
     def stop(self) -> None:
         """Stop all endpoints and the simulated time."""
