@@ -29,7 +29,17 @@ def tcp_line(*arguments: str) -> Iterator[str]:
     names = main.context_settings["help_option_names"]
     made = simulate.make_context("simulate", [*arguments], help_option_names=names)
     with made as context:
-        places = ("pty", "serial", "tcp", "rtu_tcp", "script", "control", "as_json")
+        places = (
+            "pty",
+            "serial",
+            "tcp",
+            "rtu_tcp",
+            "script",
+            "control",
+            "sources",
+            "once",
+            "as_json",
+        )
         options = {name: given for name, given in context.params.items() if name not in places}
         with simulation_of(**options) as simulation:
             host, port = simulation.serve_tcp()

@@ -19,6 +19,7 @@ from tui.drive.finding import LineSetting
 from tui.session.connect.identify import ScanResult
 from tui.simulator import Simulation, parse_drives
 
+from ..session.test_ghost_record import record_of_one_reply
 from . import test_fault_status as fault_status
 from .commands import ended, invoked, tcp_line
 from .printed import documents, form_of, forms, forms_of
@@ -103,6 +104,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
 ELSEWHERE = {
     "RunDocument", "HoldDocument", "ProveDocument", "AcceptDocument", "SimulationReady",
     "InputsDocument", "BenchDocument", "BenchWaitsDocument", "BenchRefusedDocument",
+    "GhostDocument",
     "ServeReady", "PublishReady", "ScanSlowDocument", "ScanUnclearDocument", "PortDocument",
 }  # fmt: skip
 """Forms of the tests below; this computer may have no port."""
@@ -200,6 +202,20 @@ def test_simulate_prints_its_documents(tmp_path: Path) -> None:
     assert form_of(reported) == "SimulationReady"
     assert port_of(reported["line"])
     assert reported["drives"] == [{"profile": "atv71", "device": 2}]
+
+
+def test_ghost_prints_its_documents(tmp_path: Path) -> None:
+    place = f"{record_of_one_reply(tmp_path)}@2"
+    simulate = [*DRIVEPANEL, "simulate", "--from", place, "--tcp", "127.0.0.1:0", "--json"]
+    with served(simulate, ready="{") as simulation:
+        (reported,) = documents(simulation.ready)
+        assert form_of(reported) == "SimulationReady"
+        (ghost,) = reported["ghosts"]
+        assert (ghost["device"], ghost["profile"], ghost["repeats"]) == (2, "atv71", True)
+        line = reported["line"]
+        assert drivepanel("read", line, "-d", "2", "-p", "atv71", "ACC").returncode != 0
+        assert simulation.process.stdout is not None
+        assert forms_of(simulation.process.stdout.readline()) == {"GhostDocument"}
 
 
 def test_serve_prints_its_documents() -> None:

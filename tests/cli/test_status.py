@@ -42,6 +42,11 @@ USAGE = {
     ),
     "a simulation nowhere": ("simulate", "atv71"),
     "a simulation in two places": ("simulate", "atv71", "--pty", "p", "--tcp", "127.0.0.1:0"),
+    "a simulation of nothing": ("simulate", "--tcp", "127.0.0.1:0"),
+    "a ghost of no file": ("simulate", "--from", "no.sqlite@2", "--tcp", "127.0.0.1:0"),
+    "a script that is no file": (
+        "simulate", "atv71", "--tcp", "127.0.0.1:0", "--script", "no-such-script",
+    ),
     "a TCP place that is none": ("simulate", "atv71", "--tcp", "x"),
     "two simulated drives with one address": (
         "simulate", "atv71@2", "atv71@2", "--tcp", "127.0.0.1:0",

@@ -13,6 +13,7 @@ from tui.drive.profile.profile import Profile
 
 from .drive import SimulatedDrive
 from .errors import SimulatorError
+from .ghost import GhostDrive
 from .server.client_settings import ClientSettings
 from .server.conversation import Conversation, RtuConversation, TcpConversation
 from .server.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
@@ -32,6 +33,7 @@ class Simulation:
     The drives' time passes from `start` to `stop`, in a thread of its own; every endpoint has a
     thread too. `profiles` replaces the installed profiles, by id; `clock` is the drives' time, in
     s. With `any_settings`, the baud and stop bits of a client of a pseudo-terminal do not matter.
+    `ghosts` are recorded drives on the same line.
     Raises SimulatorError for two drives with one address, UnknownProfile, UnknownParameter.
     """
 
@@ -46,10 +48,11 @@ class Simulation:
         profiles: Mapping[str, Profile] | None = None,
         clock: Callable[[], float] = time.monotonic,
         any_settings: bool = False,
+        ghosts: Sequence[GhostDrive] = (),
     ) -> None:
         self._any_settings = any_settings
         self.timing = timing or LineTiming()
-        addresses = [spec.address for spec in drives]
+        addresses = [spec.address for spec in drives] + [ghost.address for ghost in ghosts]
         twice = next((a for a in addresses if addresses.count(a) > 1), None)
         if twice is not None:
             raise SimulatorError(f"Two simulated drives have address {twice}; give each its own.")
@@ -66,6 +69,7 @@ class Simulation:
             ],
             self.timing,
             clock,
+            ghosts,
         )
         self.faults = FaultPlan(faults or FaultRates(), seed, habits or Habits())
         self._endpoints: list[Endpoint] = []

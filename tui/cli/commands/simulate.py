@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from typing import TYPE_CHECKING
@@ -23,6 +23,7 @@ from ..shared.signals import never_suspended
 
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, Simulation
+    from tui.simulator.ghost import GhostDrive
 
 USUAL = (19200, "8E1")
 """Baud and format of a LINE that names none."""
@@ -32,7 +33,6 @@ USUAL = (19200, "8E1")
 @click.argument(
     "drives",
     nargs=-1,
-    required=True,
     metavar="PROFILE[@ADDRESS]...",
     shell_complete=complete_profile,
 )
@@ -90,6 +90,14 @@ USUAL = (19200, "8E1")
     help="Run the motors at this frequency from the start.",
 )
 @click.option(
+    "--from",
+    "sources",
+    multiple=True,
+    metavar="FILE@ADDRESS",
+    help="Answer as the drive of a record did (docs/recording.md).",
+)
+@click.option("--once", is_flag=True, help="Stop at the end of a record.")
+@click.option(
     "--script",
     metavar="FILE",
     help="Run the lines of this file (docs/cli.md, the bench).",
@@ -116,6 +124,8 @@ def simulate(
     faults: tuple[str, ...],
     seed: int,
     run_hz: float,
+    sources: tuple[str, ...],
+    once: bool,
     script: str | None,
     control: str | None,
     as_json: bool,
@@ -127,8 +137,17 @@ def simulate(
     """
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
         raise click.UsageError("Say where: one of --pty, --serial, --tcp, --rtu-tcp.")
+    if not drives and not sources:
+        raise click.UsageError("Say what: PROFILE@ADDRESS, or --from FILE@ADDRESS.")
+    from ..running.ghosts import ghost_field, ghosts_of, say_ghost
+
+    recorded = ghosts_of(sources)
+    ghosts = [
+        item.ghost(repeats=not once, report=lambda text: say_ghost(text, as_json))
+        for item in recorded
+    ]
     simulation = simulation_of(
-        drives, baud, form, any_settings, real_time, sets, protects, faults, seed, run_hz
+        drives, baud, form, any_settings, real_time, sets, protects, faults, seed, run_hz, ghosts
     )
     from tui.simulator import Bench
 
@@ -150,14 +169,20 @@ def simulate(
             ending.callback(BenchSocket(bench, control).close)
         bench.start()
         specs = [drive.spec for drive in simulation.drives]
-        names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
+        names = ", ".join(
+            [f"{spec.profile}@{spec.address}" for spec in specs]
+            + [f"ghost@{item.device} ({item.text})" for item in recorded]
+        )
         if as_json:
             from ..documents.other_documents import SimulatedDriveField, SimulationReady
 
             found = [
                 SimulatedDriveField(profile=spec.profile, device=spec.address) for spec in specs
             ]
-            print_json(SimulationReady(line=where, drives=found), compact=True)
+            ready = SimulationReady(
+                line=where, drives=found, ghosts=[ghost_field(item, once) for item in recorded]
+            )
+            print_json(ready, compact=True)
         else:
             say(f"Ready: {names} on {where}. Ctrl-C ends it.")
         run_script(bench, lines, as_json)
@@ -177,6 +202,7 @@ def simulation_of(
     faults: tuple[str, ...],
     seed: int,
     run_hz: float,
+    ghosts: Sequence[GhostDrive] = (),
 ) -> Simulation:
     """The simulated drives that these options describe, served nowhere as yet."""
     from tui.drive.profile.library import load
@@ -184,20 +210,24 @@ def simulation_of(
 
     specs = [
         replace(spec, run_hz=run_hz, wander=bool(run_hz))
-        for spec in _configured(parse_drives(",".join(drives)), sets, protects)
+        for spec in _configured(parse_drives(",".join(drives)) if drives else [], sets, protects)
     ]
-    own = load(specs[0].profile).data.link
+    profiles = [load(spec.profile) for spec in specs[:1]]
+    profiles += [ghost.profile for ghost in ghosts if ghost.profile is not None]
+    own = profiles[0].data.link if profiles else None
+    usual_baud, usual_form = (own.baud, own.format) if own else USUAL
     try:
         rates, habits = troubles_of(_typed_troubles(faults))
     except SimulatorError as error:
         raise click.UsageError(str(error)) from None
     return Simulation(
         specs,
-        timing=LineTiming(baud or own.baud, (form or own.format).upper(), real_time),
+        timing=LineTiming(baud or usual_baud, (form or usual_form).upper(), real_time),
         faults=rates,
         habits=habits,
         seed=seed,
         any_settings=any_settings,
+        ghosts=ghosts,
     )
 
 

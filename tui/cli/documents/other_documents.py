@@ -218,6 +218,17 @@ class SimulatedDriveField(DocumentPart):
     device: int
 
 
+class GhostField(DocumentPart):
+    """A drive played from a record, whose first exchange was at `begun`."""
+
+    device: int
+    profile: str | None
+    file: str
+    begun: str
+    seconds: float
+    repeats: bool
+
+
 class SimulationReady(Document, kw_only=True):
     """`simulate`: the line is served."""
 
@@ -225,6 +236,15 @@ class SimulationReady(Document, kw_only=True):
     event: Literal["ready"] = "ready"
     line: str
     drives: list[SimulatedDriveField]
+    ghosts: list[GhostField]
+
+
+class GhostDocument(Document, kw_only=True):
+    """`simulate`: a record ended or began again, or does not have a request; once for each."""
+
+    command: Literal["simulate"] = "simulate"
+    event: Literal["ghost"] = "ghost"
+    text: str
 
 
 class ServeReady(Document, kw_only=True):

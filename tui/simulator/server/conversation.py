@@ -191,7 +191,12 @@ class RtuConversation:
             return
         start = self._received
         if self._timing.real_time:
-            start += max(reply.turnaround, self._timing.silence)
+            turnaround = reply.turnaround
+            if reply.took is not None:
+                turnaround = reply.took - len(reply.data) * self._timing.character
+            start += max(turnaround, self._timing.silence)
+        elif reply.took is not None:
+            start += reply.took
         for delay, data in self._faults.carry(reply.data):
             self._outbox.put(start + delay, data, self._pace)
 
@@ -229,7 +234,7 @@ class TcpConversation:
         reply = self._line.ask(served, message[MBAP:])
         if reply is None:
             return
-        wait = reply.turnaround if self._line.timing.real_time else 0.0
+        wait = reply.turnaround if self._line.timing.real_time else reply.took or 0.0
         for delay, replier, pdu in self._faults.carry_message(unit, reply.data):
             head = message[:4] + (len(pdu) + 1).to_bytes(2, "big") + bytes([replier])
             self._outbox.put(now + wait + delay, head + pdu, 0.0)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 
 from ..drive import SimulatedDrive
 from ..errors import SimulatorError
+from ..ghost import GhostDrive
 from ..spec import LineTiming
 from .client_settings import ClientSettings
 from .frames import is_sealed, seal
@@ -25,10 +26,12 @@ class PendingReply:
 
     data: bytes
     turnaround: float
+    took: float | None = None
+    """Time in s from the end of the request to the end of the reply, by a record; None without."""
 
 
 class SimulatedLine:
-    """Drives on one line.
+    """Drives on one line, and ghosts of recorded ones.
 
     Each drive has a time of its own that follows the clock, so that a request costs the steps of
     the drives that it concerns only.
@@ -39,8 +42,10 @@ class SimulatedLine:
         drives: Sequence[SimulatedDrive],
         timing: LineTiming,
         clock: Callable[[], float] = time.monotonic,
+        ghosts: Sequence[GhostDrive] = (),
     ) -> None:
         self.drives = tuple(drives)
+        self.ghosts = tuple(ghosts)
         self.timing = timing
         self._clock = clock
         self._lock = threading.Lock()
@@ -126,4 +131,7 @@ class SimulatedLine:
                 answer = drive.line_side.answer(address, pdu)
                 if answer is not None:
                     reply = PendingReply(answer, drive.station.turnaround)
+        for ghost in self.ghosts:
+            if ghost.address == address and (found := ghost.answer(pdu)) is not None:
+                return PendingReply(found.data, found.took, found.took)
         return reply

@@ -1,0 +1,203 @@
+"""Ghost of a recorded drive: it answers as the drive did, at the times of its record.
+
+A request that the record has is answered as it was: by a value, a refusal or nothing. A read that
+it has not is answered from its other reads, if they cover it. All else is refused.
+"""
+
+from __future__ import annotations
+
+import time
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+from tui.drive.profile.profile import Profile
+
+from .rules import Refusals, traits_of
+
+GHOST_READS = (3, 4)
+"""Functions that read words, whose values the record has by address."""
+GHOST_WRITES = (6, 16)
+GHOST_REFUSALS = Refusals(1, 2, 2, 3, 4, 3)
+"""Refusals of a drive whose profile is not known."""
+SHORTEST_RECORD = 1.0
+"""Least time in s after which a record begins again."""
+
+
+class RecordedExchange(NamedTuple):
+    """One exchange of the record; request and reply are function and data."""
+
+    at: float
+    """Time of the request, in s since the first one."""
+    took: float
+    """Time in s from the end of the request to the end of the reply; 0 if it is not known."""
+    request: bytes
+    reply: bytes | None
+    """None if no valid reply came."""
+
+
+class GhostReply(NamedTuple):
+    """A reply and the time after which its end arrives, in s."""
+
+    data: bytes
+    took: float
+
+
+class _Track:
+    """Values by time: the last one holds until the next, the first one from the beginning."""
+
+    def __init__(self) -> None:
+        self._times: list[float] = []
+        self._items: list[tuple[float, bytes | None]] = []
+
+    def add(self, at: float, took: float, data: bytes | None) -> None:
+        self._times.append(at)
+        self._items.append((took, data))
+
+    def at(self, now: float) -> tuple[float, bytes | None]:
+        """Return what held at a time: how long the reply took, and its data."""
+        return self._items[max(0, bisect_right(self._times, now) - 1)]
+
+
+class GhostDrive:
+    """A drive played from a record; its time begins with the first request.
+
+    At the end, the record begins again, or the ghost falls silent. `report` receives sentences: the
+    end of the record, and each request that it does not have, once. Raises ValueError for no
+    exchanges.
+    """
+
+    def __init__(
+        self,
+        address: int,
+        exchanges: Sequence[RecordedExchange],
+        profile: Profile | None = None,
+        *,
+        repeats: bool = True,
+        clock: Callable[[], float] = time.monotonic,
+        report: Callable[[str], None] = lambda text: None,
+    ) -> None:
+        if not exchanges:
+            raise ValueError(f"The record has no exchange with device {address}.")
+        self.address = address
+        self.profile = profile
+        self.report = report
+        self._clock = clock
+        self._repeats = repeats
+        self._begun: float | None = None
+        self._rounds = 0
+        self._unknown: set[bytes] = set()
+        self._requests: dict[bytes, _Track] = {}
+        self._words: dict[tuple[int, int], _Track] = {}
+        self._any = _Track()
+        for item in sorted(exchanges, key=lambda exchange: exchange.at):
+            self._add(item)
+        last = max(item.at + item.took for item in exchanges)
+        self.length = max(SHORTEST_RECORD, last)
+        """Length of the record, in s."""
+        self._refusals = GHOST_REFUSALS if profile is None else traits_of(profile).refusals
+
+    def _add(self, item: RecordedExchange) -> None:
+        track = self._requests.setdefault(item.request, _Track())
+        track.add(item.at, item.took, item.reply)
+        self._any.add(item.at, item.took, item.reply)
+        if _is_good_read(item):
+            assert item.reply is not None
+            for place, address in enumerate(_addresses(item.request)):
+                word = item.reply[2 + 2 * place : 4 + 2 * place]
+                track = self._words.setdefault((item.request[0], address), _Track())
+                track.add(item.at, item.took, word)
+
+    def answer(self, pdu: bytes) -> GhostReply | None:
+        """Return the reply to a request without address and checksum; None for no reply."""
+        now = self._position()
+        if now is None or not pdu:
+            return None
+        track = self._requests.get(pdu)
+        if track is not None:
+            took, reply = track.at(now)
+            words = self._read(pdu, now) if reply is not None and not reply[0] & 0x80 else None
+            return _reply(words or reply, took)
+        if (words := self._read(pdu, now)) is not None:
+            took, last = self._any.at(now)
+            return None if last is None else _reply(words, took)
+        return self._refuse(pdu)
+
+    def _position(self) -> float | None:
+        """Return the present time of the record, in s; None after its end."""
+        now = self._clock()
+        if self._begun is None:
+            self._begun = now
+        rounds, position = divmod(now - self._begun, self.length)
+        if rounds > self._rounds:
+            self._rounds = int(rounds)
+            if self._repeats:
+                self.report(f"The record of drive {self.address} begins again.")
+            elif rounds == 1:
+                self.report(f"The record of drive {self.address} has ended: it is silent now.")
+        if rounds and not self._repeats:
+            return None
+        return position
+
+    def _read(self, pdu: bytes, now: float) -> bytes | None:
+        """Return the reply to a read whose words are all known, each as it was last; else None."""
+        if pdu[0] not in GHOST_READS or len(pdu) != 5:
+            return None
+        tracks = [self._words.get((pdu[0], address)) for address in _addresses(pdu)]
+        known = [track.at(now)[1] for track in tracks if track is not None]
+        data = b"".join(word for word in known if word is not None)
+        if not tracks or len(data) != 2 * len(tracks):
+            return None
+        return bytes([pdu[0], len(data)]) + data
+
+    def _refuse(self, pdu: bytes) -> GhostReply | None:
+        """Answer a request that the record does not have, and report it once."""
+        code = self._refusal(pdu[0])
+        if pdu not in self._unknown:
+            self._unknown.add(pdu)
+            how = "without a reply" if code is None else f"with exception {code}"
+            self.report(f"Drive {self.address}: {_text(pdu)} is not in the record; answered {how}.")
+        if code is None:
+            return None
+        return _reply(bytes([pdu[0] | 0x80, code]), self._any.at(0.0)[0])
+
+    def _refusal(self, function: int) -> int | None:
+        if function in GHOST_READS:
+            silent = self._refusals.unknown_address is None or self.profile is None
+            default = self._refusals.unknown_address
+            return default if silent else self._unknown_read
+        if function in GHOST_WRITES:
+            return self._refusals.not_now
+        return self._refusals.unknown_function
+
+    @property
+    def _unknown_read(self) -> int | None:
+        assert self.profile is not None
+        return self.profile.data.reading.unknown_exception
+
+
+def _is_good_read(item: RecordedExchange) -> bool:
+    request, reply = item.request, item.reply
+    if request[0] not in GHOST_READS or reply is None or reply[0] != request[0]:
+        return False
+    return len(reply) == 2 + 2 * len(_addresses(request))
+
+
+def _addresses(pdu: bytes) -> range:
+    first = int.from_bytes(pdu[1:3], "big")
+    return range(first, first + int.from_bytes(pdu[3:5], "big"))
+
+
+def _reply(data: bytes | None, took: float) -> GhostReply | None:
+    return None if data is None else GhostReply(data, took)
+
+
+def _text(pdu: bytes) -> str:
+    """Return a request as text."""
+    if pdu[0] in GHOST_READS and len(pdu) == 5 and (addresses := _addresses(pdu)):
+        if len(addresses) == 1:
+            return f"the read of {addresses[0]}"
+        return f"the read of {addresses[0]} to {addresses[-1]}"
+    if pdu[0] in GHOST_WRITES and len(pdu) >= 3:
+        return f"the write {pdu.hex(' ')} to {int.from_bytes(pdu[1:3], 'big')}"
+    return f"the request {pdu.hex(' ')}"
