@@ -171,6 +171,54 @@ def test_planted_no_limits_runs_beyond_high_speed() -> None:
     assert made.drive(2).motor.frequency > 45
 
 
+def test_stop_key_coasts_and_needs_a_new_command() -> None:
+    bench = Bench(made := simulation("atv312", run_hz=30.0, sets={"FR1": 1, "CD1": 1}))
+    pass_time(made, 4.0)
+    assert made.drive(2).motor.frequency > 20
+    assert bench.do("key STOP")[0].text == "STOP: freewheel"
+    pass_time(made, 0.5)
+    motor = made.drive(2).motor
+    assert (motor.frequency, motor.energised) == (0, False)
+    assert motor.rotor > 10
+    bench.do("LI1=0")
+    pass_time(made, 0.1)
+    bench.do("LI1=1")
+    pass_time(made, 4.0)
+    assert made.drive(2).motor.frequency > 20
+
+
+def test_local_key_of_an_altivar_21_takes_the_motor_from_the_line() -> None:
+    played = Exchange("atv21", sets={"F803": 0})
+    played.play("""
+        > 02 06 FA01 0BB8   # 30 Hz
+        > 02 06 FA00 C400   # run by the line
+        . 6
+    """)
+    press = played.drive.keypad
+    assert press["LOC"]() == "local"
+    played.play("""
+        > 02 06 FA00 C000   # the line stops: ignored
+        . 2
+        > 02 03 FE45 0001
+        < 02 03 02 0001
+        > 02 03 FE46 0001
+        < 02 03 02 0003
+    """)
+    assert played.drive.motor.frequency == pytest.approx(30.0)
+    assert played.drive.raw("FD01") & 1 << 15
+    press["STOP"]()
+    played.play(". 6")
+    assert played.drive.motor.frequency == 0
+    assert press["REM"]() == "remote"
+    played.play(". 0.1")
+    assert not played.drive.raw("FD01") & 1 << 15
+    with pytest.raises(SimulatorError, match="local only"):
+        press["RUN"]()
+    press["STOP"]()
+    assert played.drive.fault is not None
+    assert played.drive.fault.raw == 17
+
+
 def test_clear_undoes_everything() -> None:
     bench = Bench(made := simulation("atv71"))
     before = bench.do("state")[0].state
@@ -198,6 +246,7 @@ def test_clear_undoes_everything() -> None:
         ("2: mains 180", "for example mains 180V"),
         ("2: plant a-tree", "slow-ramps"),
         ("2: clear 3", "write clear alone"),
+        ("2: key LOC", "Keys: STOP"),
         ("2: jam, load", "write a value"),
         ("at 99999s: 2: jam", "latest time"),
         ("at 1s: 9: jam", "No simulated drive has address 9"),
@@ -211,10 +260,10 @@ def test_invalid_line_changes_nothing(line: str, why: str) -> None:
 
 
 def test_every_example_of_the_table_is_accepted() -> None:
-    bench = Bench(simulation("atv71"))
+    bench = Bench(simulation("atv71", "atv21"))
     for word, command in BENCH.items():
         for value in command.takes or ("",):
-            bench.check(f"2: {word} {value}")
+            bench.check(f"{3 if word == 'key' else 2}: {word} {value}")
 
 
 def test_line_with_a_time_waits_and_is_reported() -> None:

@@ -141,6 +141,24 @@ def _plant(drive: SimulatedDrive, value: str) -> Deed:
     return plant
 
 
+def _key(drive: SimulatedDrive, value: str) -> Deed:
+    name = next((name for name in drive.keypad if name.casefold() == value.casefold()), None)
+    if name is None:
+        known = ", ".join(drive.keypad) or "none are simulated"
+        raise SimulatorError(f"'key {value}': {drive.profile.name} has no such key. Keys: {known}.")
+    press = drive.keypad[name]
+
+    def key() -> str:
+        if not drive.conditions.powered:
+            return "no key pressed: it has no supply"
+        try:
+            return press()
+        except SimulatorError as error:
+            return str(error)
+
+    return key
+
+
 def _clear(drive: SimulatedDrive, value: str) -> Deed:
     _no_value(value, "clear")
 
@@ -189,6 +207,11 @@ BENCH: Mapping[str, BenchCommand] = {
     "wire": BenchCommand(("cut", "join"), "Cut or join the drive's wire to the line.", _wire),
     "mains": BenchCommand(
         ("180V", NORMAL), "Set the supply voltage; below 70 % the drive trips.", _mains
+    ),
+    "key": BenchCommand(
+        ("STOP", "LOC", "REM", "RUN"),
+        "Press a key of the keypad. LOC, REM and RUN are those of the ATV21.",
+        _key,
     ),
     "load": BenchCommand(
         ("120%", NORMAL), "Set the load at rated speed, in rated torque.", _load

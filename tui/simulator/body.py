@@ -183,7 +183,7 @@ class Body:
 
     def ramps(self, second: bool = False) -> tuple[float, float]:
         """Return acceleration and deceleration in Hz/s, from the drive's own ramp times."""
-        span = self.value("rated_frequency", self.rating.frequency)
+        span = self.value(self.traits.ramps_to, self.rating.frequency)
         up = self.value("acceleration_2" if second else "acceleration", 3.0)
         down = self.value("deceleration_2" if second else "deceleration", up)
         slower = self.conditions.slows()

@@ -6,7 +6,9 @@ Several threads may request and step a drive; each public method holds its lock.
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from random import Random
 
 from tui.drive.profile.profile import Profile
@@ -72,6 +74,10 @@ class SimulatedDrive:
         self.conditions = self._body.conditions
         """Its supply, load, wire and planted defects; a change acts at the next step."""
         self._chart = CHARTS[traits.kind](self._body)
+        self.keypad = {
+            name: partial(self._press, press) for name, press in self._chart.keys.items()
+        }
+        """Keys of its keypad by name; each returns the result as text, or raises SimulatorError."""
         self._watch = SilenceWatch(self._body)
         self._tripping = Tripping(self._body, self._chart, self._watch)
         self._memory = SettingsMemory(self._body)
@@ -206,6 +212,12 @@ class SimulatedDrive:
             if self._body.powered:
                 self._chart.follow()
                 self._refresh()
+            return reported
+
+    def _press(self, press: Callable[[], str]) -> str:
+        with self._lock:
+            reported = press()
+            self._refresh()
             return reported
 
     def provoke(self, fault: str | int, *, persists: bool = False) -> None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Quantity
 
 ChartKind = Literal["drivecom", "altivar21", "leroy-somer", "own"]
 
@@ -58,6 +59,8 @@ class Traits:
     """Status bit 9 shows only that no forced local is on (ATV31/312)."""
     max_hz_high_resolution: float | None = None
     """Frequency of 32767 with CMI bit 9 set; None: the maximum frequency TFR (ATV71)."""
+    ramps_to: Quantity = "rated_frequency"
+    """Frequency that the ramps reach from 0 in the ramp time."""
     limits: Mapping[str, str] = field(default_factory=dict)
     """Words that the drive itself limits by another, in the same counts, by code."""
     first_values: Mapping[str, int] = field(default_factory=dict)
@@ -103,6 +106,7 @@ TRAITS: Mapping[str, Traits] = {
     "atv21": Traits(
         "altivar21",
         ALTIVAR_21,
+        ramps_to="max_frequency",
         limits={"FA01": "FH"},
         first_values={"FH": 8000, "F111": 2, "F112": 6, "F113": 10, "F130": 4},
     ),

@@ -10,6 +10,7 @@ wiring most drives have.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from tui.drive.profile.schema import Parameter, Quantity
@@ -17,7 +18,13 @@ from tui.drive.profile.schema import Parameter, Quantity
 from ..body import Body, Fallback
 from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
-from .altivar21_words import ANALOG_HZ, outputs, show_altivar21_words
+from .altivar21_keypad import (
+    KEYPAD_COMMAND,
+    KEYPAD_REFERENCE,
+    LOCAL_STATUS,
+    Altivar21Keypad,
+)
+from .altivar21_words import ANALOG_HZ, outputs, show_altivar21_words, take_effect
 
 INPUT_FUNCTIONS = {"F": "F111", "R": "F112", "RES": "F113"}
 FORCED_LOCAL, SECOND_REFERENCE, PRESET_INPUT = 48, 38, 6
@@ -135,12 +142,31 @@ class Altivar21Chart:
         """True if the emergency stop is in force; a fault reset ends it."""
         self._target_hz = 0.0
         self._inputs = Altivar21Inputs(body)
+        self._keypad = Altivar21Keypad()
 
     def power_up(self) -> None:
         """Start without commands of the line and without a latched stop."""
         self._last = 0
         self._latched = False
         self._stop = Stop.RAMP
+        self._keypad.give()
+
+    @property
+    def keys(self) -> Mapping[str, Callable[[], str]]:
+        """Keys of the keypad."""
+        return {
+            "LOC": lambda: self._keypad.take(runs=self._run_ordered(), hz=self._wanted()),
+            "REM": self._keypad.give,
+            "RUN": self._keypad.run,
+            "STOP": self._press_stop,
+        }
+
+    def _press_stop(self) -> str:
+        """Stop in local; in remote, pressed twice, it is an emergency stop."""
+        if self._keypad.local:
+            return self._keypad.stop()
+        self._latched = True
+        return "STOP twice: emergency stop"
 
     def run(self, hz: float) -> None:
         """Run by F, or R for the other direction, at a reference in Hz at VIA."""
@@ -182,7 +208,7 @@ class Altivar21Chart:
 
     def _sources(self) -> Sources:
         word = self._word
-        if self._inputs.switched(FORCED_LOCAL):
+        if self._keypad.local or self._inputs.switched(FORCED_LOCAL):
             return Sources(command=False, reference=False, preset=0)
         command = bool(word & OWN_COMMAND) or self._body.setting("CMOD", 0) == SERIAL_COMMAND
         chosen = self._body.setting("FMOD", 1)
@@ -195,15 +221,20 @@ class Altivar21Chart:
     def trip(self, stop: Stop) -> None:
         """Stop the motor as the fault demands, and show the fault."""
         self._stop = stop
+        self._keypad.runs = False
 
     def reset_fault(self) -> None:
         """Clear the fault if its cause is removed; words in RAM return to their first values.
 
         The priority bits are cleared with them: closed terminals command until the line takes
-        control again.
+        control again. Settings that wait for a reset take effect; without a fault, only at
+        standstill.
         """
         fault = self._body.fault
+        if fault is None and not self._body.turning:
+            take_effect(self._body)
         if fault is not None and not fault.persists:
+            take_effect(self._body)
             self._body.fault = None
             self._body.registers.restore(volatile_only=True)
             self._body.line_orders.forget()
@@ -222,6 +253,8 @@ class Altivar21Chart:
         body = self._body
         if body.fault is not None or body.fallback is Fallback.STOP:
             return False
+        if self._keypad.local:
+            return self._keypad.runs
         if self._sources().command:
             return bool(self._word & RUN) and not self._word & COAST
         return self._inputs.run_ordered
@@ -229,6 +262,8 @@ class Altivar21Chart:
     def _wanted(self) -> float:
         """Return the reference in Hz, signed by direction."""
         body = self._body
+        if self._keypad.local:
+            return self._keypad.hz
         sources = self._sources()
         hz = self._inputs.hz
         if sources.preset:
@@ -302,7 +337,8 @@ class Altivar21Chart:
         body.show_raw("status_word_2", self._status_2(sources))
         reached = motor.energised and abs(motor.frequency - self._target_hz) < ATV21_REACHED_HZ
         body.show_raw("status_word_3", (1 << 12 | 1 << 13) if reached else 0)
-        body.show_code("FE45", SERIAL_COMMAND if sources.command else 0)
+        command = KEYPAD_COMMAND if self._keypad.local else 0
+        body.show_code("FE45", SERIAL_COMMAND if sources.command else command)
         body.show_code("FE46", self._reference_source(sources))
         body.show_code("FD06", body.terminals.bits())
         body.show_code("FD07", outputs(body))
@@ -311,6 +347,8 @@ class Altivar21Chart:
         body.show("output_frequency", abs(motor.frequency))
 
     def _reference_source(self, sources: Sources) -> int:
+        if self._keypad.local:
+            return KEYPAD_REFERENCE
         if sources.preset:
             return PRESET_REFERENCE
         return SERIAL_REFERENCE if sources.reference else ANALOG_REFERENCE
@@ -340,6 +378,7 @@ class Altivar21Chart:
             (self._latched, 12),
             (ready and run and not coast, 13),
             (ready, 14),
+            (self._keypad.local, LOCAL_STATUS),
         )
         return sum(1 << bit for given, bit in marks if given)
 

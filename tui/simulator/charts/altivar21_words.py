@@ -45,3 +45,10 @@ def show_altivar21_words(body: Body) -> None:
     for code, value in values.items():
         if parameter := body.registers.named(code):
             body.registers.put(parameter, round(value / body.scale(parameter)))
+
+
+def take_effect(body: Body) -> None:
+    """Put in force what was written for the next power-up or reset: manual 6."""
+    for parameter in body.profile.parameters:
+        if parameter.effective == "after-reset":
+            body.registers.put(parameter, body.registers.present(parameter))

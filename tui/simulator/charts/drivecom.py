@@ -6,6 +6,7 @@ variables manual, control and status words.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from tui.drive.profile.schema import Parameter
@@ -119,6 +120,20 @@ class DrivecomChart:
         """Change the reference from outside, unless the line has given one since."""
         if self._channels.now.reference is ChannelPlace.TERMINALS or self._reference.is_earlier:
             self._refer(hz)
+
+    @property
+    def keys(self) -> Mapping[str, Callable[[], str]]:
+        """Keys of the keypad: STOP, if its priority PSt is on."""
+        return {"STOP": self._press_stop}
+
+    def _press_stop(self) -> str:
+        if not self._body.setting("PST", 1):
+            return "STOP ignored: PSt is off"
+        self._body.earlier_hz = None
+        self._command.let_go()
+        self._wiring.spend()
+        self._machine.start(enabled=False)
+        return "STOP: freewheel"
 
     def _refer(self, hz: float) -> None:
         if self._channels.now.reference is ChannelPlace.TERMINALS:

@@ -8,7 +8,7 @@ the manual names no reference register, so the reference stays that of the termi
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from tui.drive.profile.schema import Parameter
@@ -110,6 +110,11 @@ class LeroySomerChart:
     def running(self) -> bool:
         """True if the drive is unlocked or turning: 6.43 cannot be changed then."""
         return self._body.turning or bool(self._bits() & UNLOCKED)
+
+    @property
+    def keys(self) -> Mapping[str, Callable[[], str]]:
+        """Return no keys: those of the keypad are not simulated."""
+        return {}
 
     def trip(self, stop: Stop) -> None:
         """Stop the motor as the fault demands."""

@@ -254,6 +254,11 @@ class OwnChart:
         self._stop = way
         self._body.earlier_hz = None
 
+    @property
+    def keys(self) -> Mapping[str, Callable[[], str]]:
+        """Return no keys: those of the keypad are not simulated."""
+        return {}
+
     def trip(self, stop: Stop) -> None:
         """Stop the motor as the fault demands, and discard the commands of the line."""
         self._end(stop)

@@ -105,6 +105,11 @@ class TerminalWiring:
         self.order = WiredOrder()
         self._spent = self._body.setting("TCT", 0) == TRANSITION
 
+    def spend(self) -> None:
+        """Require that the closed inputs open first, as after the STOP key."""
+        self.order = WiredOrder()
+        self._spent = True
+
     def follow(self) -> None:
         """Read the present inputs."""
         terminals = self._body.terminals
