@@ -6,8 +6,8 @@ import json
 import os
 import pty
 import select
+import shlex
 import signal
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -118,13 +118,15 @@ class Acceptance:
 
 
 @contextmanager
-def accepting(file: Path, line: str, *options: str) -> Iterator[Acceptance]:
-    """Start a test of the drive at address 1."""
+def accepting(file: Path, line: str, *options: str, shell: str = "") -> Iterator[Acceptance]:
+    """Start a test of the drive at address 1; `shell` runs it by a line of a shell."""
     folder = file.parent / "out"
     words = [*DRIVEPANEL, "accept", str(file), line, "--arm", "--out", str(folder), *options]
+    if shell:
+        words = ["bash", "-mc", shell.format(shlex.join(words))]
     pid, terminal = pty.fork()
     if pid == 0:
-        os.execvp(sys.executable, words)
+        os.execvp(words[0], words)
     program = Acceptance(pid, terminal, folder)
     try:
         yield program
@@ -292,6 +294,39 @@ def test_keeper_stops_the_motor_of_a_killed_test(number: signal.Signals, tmp_pat
         os.kill(program.pid, signal.SIGCONT)
         time.sleep(1.0)
         assert stands(simulation)
+
+
+def test_output_that_is_no_longer_read_stops_the_motor(tmp_path: Path) -> None:
+    file = written(tmp_path, RUN.strip().partition("\n")[2])
+    with (
+        drive(sets={**SETS, "ttO": 100}) as (simulation, line),
+        accepting(file, line, shell="{} | head -1") as program,
+    ):
+        program.answer()
+        program.end()
+        assert stands(simulation)
+        assert "its output is no longer read" in program.result["ended_by"]
+
+
+def test_test_in_the_background_is_refused(tmp_path: Path) -> None:
+    file = written(tmp_path, STEPS["direction"])
+    with drive() as (_, line), accepting(file, line, shell="{} & wait $!") as program:
+        assert program.end() == 5, program.text
+        assert "in the background" in program.text
+        assert "[y/N]" not in program.text
+
+
+def test_second_test_of_the_same_drive_is_refused(tmp_path: Path) -> None:
+    with motor_of_a_test(tmp_path) as (simulation, line, first):
+        folder = tmp_path / "more"
+        folder.mkdir()
+        with accepting(written(folder, STEPS["direction"]), line) as second:
+            assert second.end() == 5, second.text
+            assert "[y/N]" not in second.text
+        assert turns(simulation)
+        first.type("\n")
+        assert first.end() == 6, first.text
+        assert stopped_by_commands(simulation)
 
 
 def test_stop_by_another_program_ends_the_test(tmp_path: Path) -> None:

@@ -285,7 +285,7 @@ class AcceptSession:
         return TURNED.get(answer.casefold(), "")
 
     def _report(self, result: AcceptanceResult) -> None:
-        """Print the result, and write its files."""
+        """Write the files of the result, and print it."""
         from tui.session.acceptance.report_files import curve_files, result_junit, result_markdown
 
         from ..shared.output import json_text, print_json
@@ -296,21 +296,21 @@ class AcceptSession:
             self.target.line_text, result, {n: name for n, (name, _) in curves.items()},
             str(self.folder) if self._begun else None,
         )  # fmt: skip
-        if self.as_json:
-            print_json(document)
-        else:
-            say("PASSED." if result.passed else f"NOT PASSED. {result.why_not}")
-        if not self._begun:
-            return
         files = {
             f"{stem}.json": json_text(document) + "\n",
             f"{stem}.md": result_markdown(result, curves),
             f"{stem}.xml": result_junit(result),
             **dict(curves.values()),
         }
-        for name, text in files.items():
-            write_down(self.folder / name, text)
-        if not self.as_json:
+        try:  # before anything is printed: its reader may have gone
+            for name, text in files.items() if self._begun else ():
+                write_down(self.folder / name, text)
+        finally:
+            if self.as_json:
+                print_json(document)
+            else:
+                say("PASSED." if result.passed else f"NOT PASSED. {result.why_not}")
+        if self._begun and not self.as_json:
             say(f"Result: {self.folder / stem}.md, .json and .xml")
 
 

@@ -21,7 +21,7 @@ from ..read.upload import Upload, setting_codes
 from ..running.ending import Ending
 from ..running.errors import MotorStopped, MotorTripped, NotStopped
 from .carry_out import carry_out_step
-from .motion import TEST_PERIOD, MotionBench, TestEnded
+from .motion import TEST_PERIOD, AcceptanceEnded, MotionBench
 from .result import AcceptanceResult, StepResult, settings_hash
 from .step_file import MEASURED, AcceptanceFile
 from .step_work import AskTurned, StepWork
@@ -101,7 +101,7 @@ class AcceptanceRun:
             await bench.unless_ended(confirm())
             self._watch()
             await self._steps(bench, self._before)
-        except TestEnded as error:
+        except AcceptanceEnded as error:
             self.result.ended_by = str(error).rstrip(".")
         finally:
             leave()
@@ -138,7 +138,7 @@ class AcceptanceRun:
         self.result.settings_after = settings_hash(after)
 
     async def _step(self, work: StepWork, step: StepResult) -> None:
-        """Carry out one step. Raises TestEnded."""
+        """Carry out one step. Raises AcceptanceEnded."""
         step.begun, begun = time.time(), time.monotonic()
         self.say(f"{step.number}. {step.title}")
         try:

@@ -31,7 +31,7 @@ STEP_WORK: Mapping[str, Callable[[StepWork, Any, StepResult], Awaitable[None]]] 
 async def carry_out_step(work: StepWork, result: StepResult) -> None:
     """Carry out a step; its checks go into the result.
 
-    Raises StepFailed if a check is outside its limit, TestEnded, and errors.
+    Raises StepFailed if a check is outside its limit, AcceptanceEnded, and errors.
     """
     await STEP_WORK[result.step.kind](work, result.step, result)
     if failed := [check.text for check in result.checks if not check.passed]:

@@ -47,7 +47,7 @@ class StepFailed(DriveError):
     """A step did not pass."""
 
 
-class TestEnded(DriveError):
+class AcceptanceEnded(DriveError):
     """The whole test has ended early."""
 
 
@@ -91,14 +91,14 @@ class MotionBench:
     # End of the whole test
 
     def check(self) -> None:
-        """Raise TestEnded if the test has ended."""
+        """Raise AcceptanceEnded if the test has ended."""
         if self._others:
             self.whole.end(self._others)
         if self.whole.event.is_set():
-            raise TestEnded(self.whole.why)
+            raise AcceptanceEnded(self.whole.why)
 
     async def unless_ended(self, work: Coroutine[Any, Any, T]) -> T:
-        """Do some work with the motor at rest. Raises TestEnded, which cancels the work."""
+        """Do some work with the motor at rest. Raises AcceptanceEnded, which cancels the work."""
         task, end = asyncio.create_task(work), asyncio.create_task(self.whole.event.wait())
         try:
             await asyncio.wait({task, end}, return_when=asyncio.FIRST_COMPLETED)
@@ -113,7 +113,7 @@ class MotionBench:
                 await task
 
     def permit(self) -> Permit:
-        """Arm the drive, and return the permission to write. Raises TestEnded after a stop by
+        """Arm the drive, and return the permission to write. Raises AcceptanceEnded after a stop by
         another source."""
         work = self.console.session.work
         # in this order: a stop that is counted before it is reported cannot be overlooked
@@ -131,7 +131,8 @@ class MotionBench:
     async def run(self, motion: Motion, steps: Callable[[], Awaitable[None]]) -> None:
         """Run the motor, carry out some steps while it runs, and bring it to rest.
 
-        Raises StepFailed, MotorStopped, NotStopped, TestEnded, and the errors of the run command.
+        Raises StepFailed, MotorStopped, NotStopped, AcceptanceEnded, and the errors of the run
+        command.
         """
         self.check()
         self.curve, self.stopped_at = RunCurve(self.console.session.profile), 0.0
@@ -163,11 +164,13 @@ class MotionBench:
             if self._own_stop:
                 ending.end("its stop was tested")
             ending.end("the step has ended")
-            await self._rest(following)
-            passing_on.cancel()
-            await self._see_rest()
-            leave()
-            self.disarm()
+            try:
+                await self._rest(following)
+                await self._see_rest()
+            finally:
+                passing_on.cancel()
+                leave()
+                self.disarm()
         self._raise(following, working, ending, early=early)
 
     def _raise(
