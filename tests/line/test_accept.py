@@ -239,6 +239,24 @@ def test_timeout_that_is_off_fails_the_test(tmp_path: Path) -> None:
         assert "F803 is" in program.result["steps"][0]["text"]
 
 
+@pytest.mark.parametrize(("options", "status"), [((), 1), (("--rated-current", "5"), 0)])
+def test_limit_in_amperes_needs_a_current_in_amperes(
+    options: tuple[str, ...], status: int, tmp_path: Path
+) -> None:
+    """The Altivar 21 reports a share of its rated current: 39 % are not 39 A."""
+    step = 'kind = "speeds"\nhz = 20\npercent = [100]\nseconds = 0.3\n'
+    step += 'limits = { motor_current = { min = 1.0, max = 5, unit = "A" } }'
+    with (
+        drive(profile="atv21", sets={"ACC": 10, "dEC": 10}) as (_, line),
+        accepting(written(tmp_path, step, profile="atv21"), line, *options) as program,
+    ):
+        program.answer()
+        assert program.end() == status, program.text
+        checks = {c["name"]: c["value"] for c in program.result["steps"][0]["checks"]}
+        value = checks["100 %: Motor current"]
+        assert value.endswith(" A") if status == 0 else value == "-----"
+
+
 @pytest.mark.parametrize("answer", ["n", "", "yes please"])
 def test_nothing_is_written_without_a_yes(answer: str, tmp_path: Path) -> None:
     with Simulation([DriveSpec("atv312")]) as simulation:

@@ -100,8 +100,12 @@ FAULTS: dict[str, tuple[str, str]] = {
         "7: step 1, hz: this step runs at the high speed of the drive; delete hz.",
     ),
     "unknown value": (
-        step('kind = "speeds"\nhz = 50\nlimits = { motor_voltage = { max = 400 } }'),
+        step('kind = "speeds"\nhz = 50\nlimits = { motor_voltage = { max = 400, unit = "V" } }'),
         "8: step 1, limits: 'motor_voltage' is not a value of Altivar 312. It has output_freq",
+    ),
+    "no unit": (
+        step('kind = "speeds"\nhz = 50\nlimits = { motor_current = { max = 4 } }'),
+        "8: step 1, limits, motor_current: the field `unit` is missing: ",
     ),
     "unknown code": (
         step('kind = "settings"\nvalues = { XYZ = "3" }'),

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from tui.drive.values import NOT_AVAILABLE
+from tui.drive.units import factor_between
+from tui.drive.values import NOT_AVAILABLE, Value
 
-from ..reading import with_text
+from ..reading import Reading, with_text
 from ..running.watching import latest_of
+from ..shown import Quality
 from .curve import ramp_seconds
 from .motion import StepFailed
 from .plan import ramp_within, stop_within
@@ -102,31 +104,36 @@ async def _read_values(
     readings = with_text(await console.read(found.values()))
     for quantity, code in found.items():
         reading = readings[code]
-        number = reading.current_number
-        unit, name = reading.unit, f"{speed}: {MEASURED[quantity]}"
-        value = NOT_AVAILABLE if number is None else f"{reading.text} {unit}".rstrip()
-        limits = step.limits.get(quantity)
-        if quantity == "output_frequency":
+        name, limits = f"{speed}: {MEASURED[quantity]}", step.limits.get(quantity)
+        held = _in_unit(reading, limits.unit) if limits else reading.value
+        good = reading.quality is Quality.GOOD and held is not None
+        value = f"{held.text} {held.unit}".rstrip() if held and good else NOT_AVAILABLE
+        number = float(held.number) if held and good and held.number is not None else None
+        if quantity == "output_frequency" and limits is None:
             near = number is not None and abs(abs(number) - hz) <= step.tolerance
             result.check(name, value, f"{hz:g} Hz ± {step.tolerance:g} Hz", passed=near)
-        elif limits is not None or number is not None:
-            result.check(name, value, _limit_text(limits, unit), passed=_within(number, limits))
+        elif limits is not None:
+            result.check(name, value, _limit_text(limits), passed=_within(number, limits))
+        elif number is not None:
+            result.check(name, value, "", passed=True)
 
 
-def _within(number: float | None, limits: ValueLimits | None) -> bool:
-    if limits is None:
-        return True
+def _in_unit(reading: Reading, unit: str) -> Value | None:
+    """Return a value in a unit: as the drive reports it, or as a share of its rating."""
+    found = (reading.value, reading.physical)
+    return next((v for v in found if v is not None and factor_between(v.unit, unit) == 1), None)
+
+
+def _within(number: float | None, limits: ValueLimits) -> bool:
     if number is None:
         return False
     above = limits.max is not None and number > limits.max
     return not above and not (limits.min is not None and number < limits.min)
 
 
-def _limit_text(limits: ValueLimits | None, unit: str) -> str:
-    if limits is None:
-        return ""
+def _limit_text(limits: ValueLimits) -> str:
     parts = [("at least", limits.min), ("at most", limits.max)]
-    return ", ".join(f"{word} {n:g} {unit}".rstrip() for word, n in parts if n is not None)
+    return ", ".join(f"{word} {n:g} {limits.unit}" for word, n in parts if n is not None)
 
 
 async def measure_stop(work: StepWork, step: StopStep, result: StepResult) -> None:

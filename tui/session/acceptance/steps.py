@@ -23,10 +23,14 @@ StepPercent = Annotated[float, Meta(ge=1, le=100)]
 
 
 class ValueLimits(Table, frozen=True, kw_only=True):
-    """Lowest and highest allowed value, in the unit of the value."""
+    """Lowest and highest allowed value."""
 
+    unit: str
+    """Unit of both: the drive's, or one that it can be converted to."""
     min: float | None = None
+    """Lowest allowed value."""
     max: float | None = None
+    """Highest allowed value."""
 
 
 class AcceptanceStep(Table, frozen=True, kw_only=True):
