@@ -770,14 +770,28 @@ def test_lengthened_read_that_is_refused_waits_again_as_itself(kind: ResultKind)
     line.steps._probes.forms.note = (  # type: ignore[method-assign]
         lambda form, result: noted.append((form, result.kind))
     )
-    result = ExchangeResult(kind, sent=0.9)
+    strays: list[tuple[object, float]] = []
+    counted: list[object] = []
+
+    def note_strays(these: object, end: float) -> set[int]:
+        strays.append((these, end))
+        return set()
+
+    line.outcomes.note_strays = note_strays  # type: ignore[method-assign,assignment]
+    line.outcomes.count_beside = (  # type: ignore[method-assign]
+        lambda device, result: counted.append((device, result))
+    )
+    result = ExchangeResult(kind, sent=0.9, end=0.95)
     assert not line.steps.end_form(poll(), result)
     assert noted == []
+    assert strays == []
     job, form = poll(), Read(1, 100, 3)
     job.take_form(form)
     refused = kind is ResultKind.EXCEPTION
     assert line.steps.end_form(job, result) == refused
     assert noted == [(form, kind)]
+    assert strays == [(result.strays, 0.95)] * refused
+    assert counted == [(1, result)] * refused
     assert job.form == (None if refused else form)
     late = line.devices.not_before(1, form.expectation(), Priority.POLL, 1.0) > 1.0
     assert late == refused, "a copy of the refusal may come"

@@ -12,12 +12,13 @@ import pytest
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineFailed, LineLost, NoAnswer
 from tui.bus.requests import Read, WriteOne
+from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 from tui.session.clock import Clock
 from tui.session.command import stop as stops
 from tui.session.command.last_stop import LastStop, end_work
-from tui.session.command.motor_stop import FirstWave, MotorStop
+from tui.session.command.motor_stop import FirstWave, MotorStop, with_other_way
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import OVER, Phase, StopReport
 from tui.session.drive import DriveSession
@@ -533,3 +534,123 @@ def test_stop_count_of_a_drive_rises_once_whatever_fails(
     session.starts = None
     end_work(session, "a test")
     assert session.work.stops == before + 2
+
+
+# -- the stop of all, step by step -----------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("phase", "kind"),
+    [
+        (Phase.SENDING, "stop"), (Phase.STOPPING, "stop"), (Phase.STOPPED, "stop"),
+        (Phase.UNHEEDED, "failed"), (Phase.FAILED, "failed"),
+    ],
+)  # fmt: skip
+async def test_report_of_a_motor_that_does_not_stop_is_an_event_of_its_own_kind(
+    phase: Phase, kind: str, journal: Journal
+) -> None:
+    drive, events = Ramp(OwnTime(), 0.0), EventLog()
+    stopper = Stopper(drive, journal, events)
+    session = DriveSession(drive, 1, PROFILE, clock=drive.clock)
+    stopper._say(session, phase, "text", 990.0)
+    drive.clock.now += 5.0
+    stopper._say(session, phase, "another text", 990.0)
+    assert [(event.kind, event.device) for event in events.events] == [(kind, 1)]
+    assert stopper.reports[1] == StopReport(1, phase, "another text", 990.0, 1000.0)
+    stopper._say(session, phase, "third text", 991.0)
+    assert len(events.events) == 2, "of another stop"
+    assert stopper.reports[1].since == 1005.0
+
+
+async def test_work_of_each_stop_has_its_name(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drive, names = Ramp(OwnTime(), 0.0), []
+    spawn = drive.spawn
+
+    def spawned(work: Any, name: str) -> Any:
+        names.append(name)
+        return spawn(work, name)
+
+    monkeypatch.setattr(drive, "spawn", spawned)
+    sessions = [DriveSession(drive, device, PROFILE, clock=drive.clock) for device in (1, 2)]
+    stopper = Stopper(drive, journal)
+    stopper.stop(sessions[:1])
+    await until_over(stopper, [1])
+    assert names == ["stop 1"]
+    stopper.stop(sessions)
+    assert names == ["stop 1", "stop 1", "stop 2", "stop all"]
+    await until_over(stopper, [1, 2])
+
+
+class Way:
+    """A way to stop with its register and words."""
+
+    def __init__(self, address: int, *words: int, broadcast: bool = True) -> None:
+        self.address, self.words, self.broadcast = address, words, broadcast
+
+
+async def test_broadcast_follows_the_wave_with_each_word_once(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ways: dict[int, Any] = {
+        1: Way(100, 7, -1), 2: Way(100, 7), 3: Way(200, 7), 4: OrderRefused("none"),
+        5: None, 6: Way(300, 7, broadcast=False), 7: Way(400, 9),
+    }  # fmt: skip
+    done: list[object] = []
+    drive = Ramp(OwnTime(), 0.0)
+
+    def choose(device: int, order: str, raws: object) -> Any:
+        assert (order, raws) == ("quick-stop", f"raws {device}")
+        if isinstance(ways[device], Exception):
+            raise ways[device]
+        return ways[device]
+
+    async def broadcast(address: int, words: list[int], **how: Any) -> None:
+        done.append((address, *words, how["limits"], how["priority"]))
+
+    monkeypatch.setattr(stops, "chart_in_force", lambda profile, raws: profile)
+    monkeypatch.setattr(stops, "choose", choose)
+    monkeypatch.setattr(stops, "order_target", lambda profile, chart, found: found)
+    monkeypatch.setattr(stops, "limits_of", lambda profile: f"limits {profile}")
+    monkeypatch.setattr(drive, "broadcast", broadcast)
+
+    class Wave:
+        def passed(self, device: int) -> None:
+            done.append(device)
+
+        async def over(self) -> None:
+            done.append("over")
+
+    sessions = [
+        SimpleNamespace(profile=device, image=SimpleNamespace(trusted=f"raws {device}"))
+        for device in ways
+    ]
+    stopper = Stopper(drive, journal)
+    await stopper._behind_wave(cast(Any, Wave()), {9}, cast(Any, sessions), "quick-stop")
+    assert done == [
+        9, "over", (100, 7, "limits 1", Priority.STOP), (100, 0xFFFF, "limits 1", Priority.STOP),
+        (200, 7, "limits 3", Priority.STOP), (400, 9, "limits 7", Priority.STOP),
+    ]  # fmt: skip
+
+
+async def test_motion_of_a_drive_without_a_status_word_is_unknown(journal: Journal) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    here.drive.fail_read(1, STATUS, 2)
+    kind, _ = await here.stop._motion(PROFILE.data.charts[0])
+    assert kind == "unknown"
+    here.drive.fail_read(1, HERTZ, 2)
+    assert await here.stop._motion(PROFILE.data.charts[0]) == ("unknown", None)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "order", "text"),
+    [
+        ("stop", "stop", "on"), ("stop", "quick-stop", "on (it has no ramp stop: quick stop)"),
+        ("emergency-stop", "stop", "on (it has no emergency stop: ramp stop)"),
+    ],
+)  # fmt: skip
+def test_progress_names_the_way_that_the_drive_lacks(
+    wanted: OrderId, order: OrderId, text: str
+) -> None:
+    assert with_other_way("on", wanted, order) == text

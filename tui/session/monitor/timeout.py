@@ -89,7 +89,7 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
     trips = reaction is None or reaction.trips
     fault = faults.get(rules.fault, "") if trips and rules.fault is not None else ""
     sure = rules.starts_confidence != "unverified"
-    watch = TimeoutWatch(shortest[0], reaction, True, shortest[1], fault, sure)
+    watch = TimeoutWatch(shortest[0], reaction, code=shortest[1], fault=fault, sure=sure)
     return Timeout(True, replace(watch, active=watch.acts and has_begun(session)))
 
 
