@@ -24,9 +24,11 @@ from tui.bus.line_events import (
     LineEvent,
     NoticeReceived,
 )
+from tui.bus.notes import NOTES_A_LOOK
 from tui.bus.program import Program
 from tui.bus.requests import Read, WriteOne
 from tui.bus.schedule.queue import Job
+from tui.bus.share import client as client_module
 from tui.bus.share.carried import error_form
 from tui.bus.share.client import STOP_UNHEARD, ShareClient
 from tui.bus.share.messages import (
@@ -39,11 +41,13 @@ from tui.bus.share.messages import (
     Facts,
     Failed,
     Notified,
+    PollWish,
     RequestDenied,
     RequestGranted,
     StopGiven,
     Withdraw,
 )
+from tui.bus.share.owner_watch import WATCH_INTERVAL
 from tui.bus.share.requested import OWNER_ENDED, PendingRequests
 from tui.bus.shared_state import SharedState
 from tui.bus.written import DeviceWritten
@@ -288,3 +292,60 @@ def test_owner_that_is_heard_again_is_connected_again() -> None:
     here.client._hear_life(alive)
     assert heard == [alive, alive, "state", alive]
     assert here.client._reported == ""
+
+
+class Watch:
+    """A client's watch over its owner, for some of its turns."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, taken_in: bool = True) -> None:
+        self.done: list[object] = []
+        self.turns = 3
+        self.client = client = cast(Any, object.__new__(ShareClient))
+        self.pace, self.trace = SimpleNamespace(own={1: 1.0}), SimpleNamespace(looked_at=False)
+        notes = SimpleNamespace(all=[f"note {number}" for number in range(100)])
+        client._inside = SimpleNamespace(
+            facts=SimpleNamespace(notes=notes), pace=self.pace,
+            around=SimpleNamespace(trace=self.trace),
+        )  # fmt: skip
+        client._heartbeat = SimpleNamespace(turn=lambda: self.done.append("heartbeat"))
+        client._tell = self.done.append
+        client._wish = None
+        client.watching = SimpleNamespace(frozen=False, look=self._look)
+        client._wait_for_owner = lambda: self.done.append("waits")
+        monkeypatch.setattr(ShareClient, "taken_in", taken_in, raising=False)
+        monkeypatch.setattr(client_module, "asyncio", SimpleNamespace(sleep=self._sleep))
+
+    def _look(self, *, attached: bool) -> None:
+        self.done.append(attached)
+
+    async def _sleep(self, seconds: float) -> None:
+        assert seconds == WATCH_INTERVAL
+        self.turns -= 1
+        if self.turns < 0:
+            raise asyncio.CancelledError
+
+    async def run(self) -> list[object]:
+        with pytest.raises(asyncio.CancelledError):
+            await self.client._watch()
+        return self.done
+
+
+async def test_watch_sends_a_heartbeat_some_notes_and_each_new_wish(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Watch(monkeypatch)
+    here.turns = 2
+    count = NOTES_A_LOOK
+    notes = [f"note {number}" for number in range(100)]
+    wish = PollWish({1: 1.0}, False)
+    assert await here.run() == [
+        "heartbeat", *notes[:count], wish, True, "heartbeat", *notes[count : 2 * count], True,
+    ]  # fmt: skip
+
+
+async def test_watch_of_a_client_that_is_not_attached_sends_no_notes(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Watch(monkeypatch, taken_in=False)
+    here.turns, here.client._heartbeat, here.client.watching.frozen = 1, None, True
+    assert await here.run() == [PollWish({1: 1.0}, False), False, "waits"]

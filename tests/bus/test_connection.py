@@ -8,6 +8,8 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 import serial
@@ -15,10 +17,11 @@ from pymodbus.client import AsyncModbusSerialClient
 
 from tests.line_events import on_event
 from tui.bus.api import LineState, LineStatus, Priority
-from tui.bus.errors import LineClosed, LineLost, PortBusy, PortMissing
+from tui.bus.errors import LineBehind, LineClosed, LineFailed, LineLost, PortBusy, PortMissing
 from tui.bus.line import Line, Timing
 from tui.bus.line_events import StateChanged
 from tui.bus.link import RtuTcpLink, SerialLink, TcpLink
+from tui.bus.schedule import connection as connections
 
 from .conftest import OpenLine
 from .peer import PtyPeer, TcpPeer, eventually, honest, silent
@@ -221,3 +224,163 @@ async def test_idle_and_lost_lines_do_not_spin(tmp_path: Path, open_line: OpenLi
         await asyncio.sleep(1.0)
         # the peer polls twenty times a second; a spinning thread would take the whole second
         assert time.process_time() - before < 0.5
+
+
+# -- the life of a line, step by step --------------------------------------------------------------
+
+
+class Life:
+    """A connection of a line whose parts are the test's; `done` is what it did, and when."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *, shared: bool = False) -> None:
+        self.now = 100.0
+        self.done: list[object] = []
+        self.states: list[tuple[LineStatus, str, float, float | None]] = []
+        self.errors: list[type[Exception] | None] = []
+        self.serves: list[Exception | None] = []
+        self.steps = SimpleNamespace(recovered=None, behind="")
+        self.dispatcher = SimpleNamespace(
+            steps=self.steps, facts=SimpleNamespace(unkept=""), wake=None, in_flight=True,
+            fail_all=self._fail_all, serve=self._serve,
+        )  # fmt: skip
+        timing = Timing(reconnect_first=0.5, reconnect_longest=5.0)
+        around = SimpleNamespace(timing=timing, clock=lambda: self.now)
+        self.last_way = SimpleNamespace(master=None, lose=lambda: self.done.append("lose"))
+        self.shared: Any = None
+        if shared:
+            self.shared = SimpleNamespace(
+                own=self._own, pause=self._sleep, unwanted=asyncio.Future,
+                rest=lambda quiet: self.done.append(("rest", quiet)),
+            )  # fmt: skip
+        self.connection = connections.Connection(
+            cast(Any, "link"), cast(Any, around), cast(Any, self.dispatcher), self._changed,
+            lambda: 0.25, self.shared, cast(Any, self.last_way),
+        )  # fmt: skip
+        monkeypatch.setattr(connections, "open_master", self._open)
+        if not shared:
+            monkeypatch.setattr(connections, "asyncio", SimpleNamespace(sleep=self._sleep))
+
+    def _changed(self, state: Any, error: Exception | None) -> None:
+        self.states.append((state.status, state.reason, state.since, state.next_try))
+        self.errors.append(None if error is None else type(error))
+
+    async def _open(self, link: object, around: object, wake: object, opened: Any) -> Any:
+        opened("a remark")
+        return SimpleNamespace(close=lambda: self.done.append("close"))
+
+    async def _own(self, say: Any) -> None:
+        self.done.append("own")
+
+    async def _serve(self, master: object) -> None:
+        if self.shared is None:
+            assert self.last_way.master is master
+        self.done.append("serve")
+        if not self.serves:
+            raise asyncio.CancelledError
+        if (error := self.serves.pop(0)) is not None:
+            raise error
+
+    def _fail_all(self, text: str, kind: type[Exception]) -> None:
+        self.done.append((text, kind))
+
+    async def _sleep(self, seconds: float) -> None:
+        self.done.append(seconds)
+        self.now += seconds
+
+    async def run(self) -> None:
+        with pytest.raises(asyncio.CancelledError):
+            await self.connection.run()
+
+
+async def test_connection_that_ends_is_opened_again_immediately(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    life = Life(monkeypatch)
+    life.serves = [None]
+    await life.run()
+    assert life.done == ["serve", "lose", "close"] * 2
+    assert [state[0] for state in life.states] == [
+        LineStatus.CONNECTING, LineStatus.CONNECTED, LineStatus.CONNECTING, LineStatus.CONNECTED,
+    ]  # fmt: skip
+    assert life.states[1] == (LineStatus.CONNECTED, "a remark", 100.0, None)
+    assert life.dispatcher.in_flight, "only a shared line is left"
+
+
+async def test_lost_line_fails_its_requests_and_waits_longer_each_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    life = Life(monkeypatch)
+
+    async def fails(*_: object) -> Any:
+        if life.now > 110.0:
+            raise asyncio.CancelledError
+        raise LineLost("unplugged")
+
+    monkeypatch.setattr(connections, "open_master", fails)
+    await life.run()
+    lost = ("unplugged", LineLost)
+    assert life.done == [lost, 0.5, lost, 1.0, lost, 2.0, lost, 4.0, lost, 5.0]
+    assert life.states[1:3] == [
+        (LineStatus.LOST, "unplugged", 100.0, 100.5), (LineStatus.LOST, "unplugged", 100.0, 101.5),
+    ]  # fmt: skip
+    assert isinstance(life.connection.refusal, LineLost)
+
+
+async def test_line_that_was_opened_again_begins_with_the_shortest_pause(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    life = Life(monkeypatch)
+    life.serves = [LineLost("a"), LineLost("b")]
+    await life.run()
+    assert [pause for pause in life.done if isinstance(pause, float)] == [0.5, 0.5]
+    lost = [state for state in life.states if state[0] is LineStatus.LOST]
+    assert [state[2] for state in lost] == [100.0, 100.5], "since it was lost the last time"
+    assert life.connection.refusal is None
+
+
+@pytest.mark.internal_errors
+async def test_internal_error_of_the_loop_is_a_failure_of_the_line(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    life = Life(monkeypatch)
+    life.serves = [ZeroDivisionError("on purpose")]
+    await life.run()
+    text = "The line failed: ZeroDivisionError('on purpose')."
+    assert (text, LineFailed) in life.done
+    assert LineFailed in life.errors
+    assert "the line's loop failed" in caplog.text
+
+
+@pytest.mark.internal_errors
+async def test_error_in_failing_requests_does_not_end_the_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    life = Life(monkeypatch)
+    life.serves = [LineLost("a")]
+    life.dispatcher.fail_all = lambda *_: 1 / 0
+    await life.run()
+    assert life.done.count("serve") == 2
+
+
+async def test_line_that_is_behind_is_reported_and_opened_again_without_a_pause(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    life = Life(monkeypatch)
+    life.serves = [LineBehind("behind"), LineLost("refused"), LineLost("refused")]
+    life.steps.behind = "Replies are one behind."
+    await life.run()
+    assert life.done[:4] == ["serve", "lose", "close", "serve"]
+    pauses = [pause for pause in life.done if isinstance(pause, float)]
+    assert pauses == [0.5, 0.5], "it is opened again soon each time"
+    assert set(life.errors[1:]) <= {LineBehind, None}
+    assert (LineStatus.LOST, "Replies are one behind.") in [state[:2] for state in life.states]
+    assert LineStatus.CONNECTED not in [state[0] for state in life.states]
+
+
+async def test_shared_line_rests_after_its_last_request(monkeypatch: pytest.MonkeyPatch) -> None:
+    life = Life(monkeypatch, shared=True)
+    life.serves = [LineLost("a")]
+    with pytest.raises(LineLost):
+        await life.connection._once()
+    assert life.done == ["own", "serve", "lose", "close", ("rest", 0.25)]
+    assert not life.dispatcher.in_flight

@@ -20,6 +20,7 @@ from tui.bus.requests import (
     WriteMany,
     WriteOne,
     own_words_of,
+    read_request,
     words_of,
     write_request,
 )
@@ -266,3 +267,10 @@ def test_write_uses_a_function_of_the_device(
 def test_function_6_carries_one_word_only(count: int) -> None:
     with pytest.raises(RequestRefused, match=f"one word, not {count}"):
         write_request(1, 100, [5] * count, False, frozenset({3, 6, 16}))
+
+
+@pytest.mark.parametrize("function", [3, 4])
+def test_words_are_read_by_the_function_of_their_kind(function: int) -> None:
+    request = read_request(4, 100, 2, function)
+    assert (request.device, request.pdu()) == (4, bytes([function, 0, 100, 0, 2]))
+    assert request.function == function

@@ -268,3 +268,11 @@ async def test_timer_that_is_put_off_rings_once_at_its_last_time() -> None:
     timer.start(0.005, ring)
     await asyncio.sleep(0.05)
     assert len(rung) == 2, "a shorter delay does not wait for the longer one"
+
+
+async def test_time_of_an_exchange_that_has_ended_is_not_looked_at() -> None:
+    wire = Wire((0.125, REPLY))
+    wire.master._look_at_time()
+    await wire.exchange()
+    wire.master._look_at_time()
+    assert wire.master._exchange is None
