@@ -7,18 +7,23 @@ import time
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import suppress
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import pytest
 
 from tests.waiting import until
 from tui.bus.api import DeviceState, LineWorker, Priority
+from tui.bus.errors import LineLost, NoAnswer
 from tui.bus.keep_alive import KeepAlive
+from tui.drive.chart import ENABLED_KINDS
 from tui.session.drive import DriveSession
+from tui.session.monitor import line_watch as line_watches
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.unknown_drive_poller import UnknownDrivePoller
 from tui.session.read.presence import UNKNOWN_TIMEOUT
+from tui.session.timeout_report import TimeoutWatch
 
 from .fakes import OneDrive, parameter, profile_of
 
@@ -175,3 +180,333 @@ async def test_drive_is_checked_soon_after_a_stop_has_ended(
     before = kept.watch.looks[1].time
     kept.watch._kept[1].session.request_full_read()
     await until(lambda: kept.watch.looks[1].time > before)
+
+
+# -- step by step, without a wire ------------------------------------------------------------------
+
+TRIPS = TimeoutWatch(10.0, None)
+
+
+class Watched:
+    """A line watch of drives whose states a test sets; it starts no work."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 100.0
+        self.done: list[object] = []
+        self.begun = False
+        keep_alives = SimpleNamespace(
+            keep=lambda read: self.done.append(("keep", read)),
+            let_go=lambda device: self.done.append(("let go", device)),
+        )
+        self.line = SimpleNamespace(
+            facts=SimpleNamespace(keep_alives=keep_alives), spawn=self._spawn,
+            device_state=lambda device: SimpleNamespace(heard=self.heard),
+        )  # fmt: skip
+        self.heard: float | None = None
+        monkeypatch.setattr(line_watches, "has_begun", lambda _: self.begun)
+        monkeypatch.setattr(line_watches, "Reader", lambda session: f"reader {session.device}")
+        monkeypatch.setattr(
+            line_watches, "alive_read", lambda session, seconds: (session.device, seconds)
+        )
+        self.watch = LineWatch(cast(Any, self.line))
+
+    def _spawn(self, work: object, name: str) -> Any:
+        self.done.append(name)
+        return SimpleNamespace(cancel=lambda: self.done.append(f"cancel {name}"))
+
+    async def _sleep(self, seconds: float) -> None:
+        self.done.append(seconds)
+        self.now += seconds
+
+    def session(self, device: int = 1, *, has_timeout: bool = True) -> Any:
+        clock = SimpleNamespace(
+            monotonic=lambda: self.now, line_time=lambda heard: heard, sleep=self._sleep,
+            wall=lambda: 5000.0,
+        )  # fmt: skip
+        data = SimpleNamespace(communication_fault={} if has_timeout else None)
+        order = SimpleNamespace(forget=lambda: self.done.append(f"forget {device}"))
+        return SimpleNamespace(
+            device=device, clock=clock, profile=SimpleNamespace(data=data), commanded=True,
+            commanded_at=None, byte_order=order, full_reads_requested=4,
+        )  # fmt: skip
+
+    def keep(self, device: int = 1, **how: Any) -> Any:
+        monitor = SimpleNamespace(latest=None, running=False)
+        self.watch.keep(self.session(device, **how), cast(Any, monitor))
+        return self.watch._kept[device]
+
+    def look(self, device: int = 1, motion: str | None = "running", **more: Any) -> None:
+        state = None if motion is None else SimpleNamespace(motion=motion, local=False)
+        usual: dict[str, Any] = {"state": state, "time": 50.0, "before": None}
+        self.watch._looks[device] = cast(Any, SimpleNamespace(**{**usual, **more}))
+
+
+def test_drive_that_is_kept_again_replaces_the_earlier_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Watched(monkeypatch)
+    first = here.keep()
+    assert here.done == [("keep", (1, UNKNOWN_TIMEOUT)), "learner 1", "line_watch 1"]
+    assert (first.since, first.reader, first.watch, first.learned) == (
+        100.0,
+        "reader 1",
+        None,
+        None,
+    )
+    here.done.clear()
+    here.keep()
+    assert here.done == [
+        "cancel learner 1", "cancel line_watch 1", ("let go", 1), ("keep", (1, UNKNOWN_TIMEOUT)),
+        "learner 1", "line_watch 1",
+    ]  # fmt: skip
+    here.done.clear()
+    here.look()
+    here.watch.stop()
+    assert here.done == ["cancel learner 1", "cancel line_watch 1", ("let go", 1)]
+    assert (here.watch.looks, here.watch.states) == ({}, {})
+
+
+def test_keep_alive_read_ends_with_the_timeout_or_without_a_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    here.done.clear()
+    here.watch._keep_alive(kept, 5.0)
+    here.watch._keep_alive(kept, None)
+    monkeypatch.setattr(line_watches, "alive_read", lambda *_: None)
+    here.watch._keep_alive(kept, 5.0)
+    assert here.done == [("keep", (1, 5.0)), ("let go", 1), ("let go", 1)]
+
+
+@pytest.mark.parametrize(
+    ("look", "latest", "error", "motion"),
+    [
+        (50.0, 60.0, "", "stopped"), (50.0, 50.0, "", "running"), (50.0, 40.0, "", "running"),
+        (50.0, 60.0, "no answer", "running"), (None, 40.0, "", "stopped"),
+        (None, 40.0, "no answer", None), (None, None, "", None),
+    ],
+)  # fmt: skip
+def test_state_of_a_drive_is_the_newest_one_that_was_read(
+    look: float | None, latest: float | None, error: str, motion: str | None,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    if look is not None:
+        here.look(time=look)
+    if latest is not None:
+        state = SimpleNamespace(motion="stopped", local=False)
+        kept.monitor.latest = SimpleNamespace(time=latest, error=error, state=state)
+    found = here.watch.states.get(1)
+    assert (found.motion if found else None) == motion
+    assert here.watch.runs(1) == (motion == "running")
+    assert here.watch.turns(1) == {"running": True, "stopped": False, None: None}[motion]
+
+
+@pytest.mark.parametrize(
+    ("motion", "turns"),
+    [
+        ("running", True), ("starting", True), ("stopping", True), ("stopped", False),
+        ("fault", False), ("unknown", None), (None, None),
+    ],
+)  # fmt: skip
+def test_drive_may_turn_its_motor_in_enabled_states(
+    motion: str | None, turns: bool | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if motion is not None and motion != "unknown":
+        turns = motion in ENABLED_KINDS
+    here = Watched(monkeypatch)
+    here.keep()
+    here.look(motion=motion)
+    assert here.watch.turns(1) is turns
+    assert here.watch.turns(2) is None
+
+
+def test_lost_drive_still_has_its_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    here = Watched(monkeypatch)
+    here.keep()
+    here.keep(2)
+    fault = SimpleNamespace(motion="fault", local=False)
+    here.look(motion=None, before=SimpleNamespace(state=fault))
+    here.look(2, before=SimpleNamespace(state=fault))
+    assert here.watch.states[1] is cast(Any, fault)
+    assert here.watch.states[2].motion == "running"
+
+
+@pytest.mark.parametrize(
+    ("motion", "seen", "ordered", "commanded", "counts"),
+    [
+        ("running", 50.0, None, True, True), ("running", 50.0, None, False, False),
+        ("stopped", 50.0, None, True, False), ("stopped", 50.0, 49.9, True, False),
+        ("stopped", 50.0, 50.0, True, True), ("stopped", 50.0, 50.1, True, True),
+        ("unknown", 50.0, 10.0, True, True), (None, 50.0, None, True, True),
+        ("stopping", 50.0, 10.0, True, False),
+    ],
+)  # fmt: skip
+def test_commanded_motor_may_turn_until_a_later_read_shows_it_at_rest(
+    motion: str | None, seen: float, ordered: float | None, commanded: bool, counts: bool,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    kept.session.commanded, kept.session.commanded_at = commanded, ordered
+    here.look(motion=motion, time=seen)
+    assert here.watch.under_command() == ([kept.session] if counts else [])
+
+
+def test_timeout_is_pending_if_it_acts_and_would_change_anything(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    assert here.watch.watch(1) is None
+    assert here.watch.watch(2) is None
+    assert here.watch.pending_timeouts() == {}
+    assert [session.device for session in here.watch.unread()] == [1]
+    here.keep(2, has_timeout=False)
+    assert [session.device for session in here.watch.unread()] == [1]
+    kept.watch, kept.learned, here.begun = TRIPS, 90.0, True
+    assert here.watch.unread() == []
+    assert here.watch.pending_timeouts() == {1: TRIPS}
+    here.begun = False
+    assert here.watch.pending_timeouts() == {}
+    here.look()
+    assert here.watch.pending_timeouts() == {1: TRIPS}, "it runs by the line"
+    here.look(state=SimpleNamespace(motion="running", local=True))
+    assert here.watch.pending_timeouts() == {}
+    here.begun = True
+    quiet = SimpleNamespace(never_set=False, trips=False)
+    kept.watch = TimeoutWatch(10.0, cast(Any, quiet))
+    assert here.watch.pending_timeouts() == {1: kept.watch}
+    here.look(motion="stopped")
+    assert here.watch.pending_timeouts() == {}, "at rest it changes nothing"
+    quiet.never_set = True
+    here.look()
+    assert here.watch.pending_timeouts() == {}
+
+
+@pytest.mark.parametrize(
+    ("heard", "silent", "warned"),
+    [(95.0, 5.0, False), (94.9, 5.1, True), (None, 5.0, False), (None, 5.1, True)],
+)
+def test_warning_counts_from_the_last_reply_or_from_the_begin(
+    heard: float | None, silent: float, warned: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    kept.since, kept.watch, here.heard, here.begun = 100.0 - silent, TRIPS, heard, True
+    found = here.watch.warnings()
+    assert [each.device for each in found] == [1] * warned
+    assert all(each.left == pytest.approx(10.0 - silent) for each in found)
+    here.begun = False
+    assert here.watch.warnings() == []
+
+
+@pytest.mark.parametrize(
+    ("result", "forgets", "pause"),
+    [
+        (0.5, False, 0.5), (0.001, False, 0.02), (NoAnswer(1, 3, 1), False, 1.0),
+        (LineLost("unplugged"), True, 1.0), (ZeroDivisionError(), False, 3.0),
+    ],
+)  # fmt: skip
+@pytest.mark.internal_errors
+async def test_step_is_repeated_after_its_pause_whatever_happens(
+    result: float | Exception, forgets: bool, pause: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    here.done.clear()
+    tries = [result, result]
+
+    async def step(given: object) -> float:
+        assert given is kept
+        if not tries:
+            raise asyncio.CancelledError
+        if isinstance(found := tries.pop(), Exception):
+            raise found
+        return found
+
+    with pytest.raises(asyncio.CancelledError):
+        await here.watch._again(kept, step)
+    assert here.done == ["forget 1", pause] * 2 if forgets else here.done == [pause] * 2
+
+
+async def test_check_comes_early_once_a_full_read_is_requested(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    begun: list[float] = []
+
+    async def step(_: object) -> float:
+        begun.append(round(here.now - 100.0, 3))
+        if len(begun) == 4:
+            raise asyncio.CancelledError
+        if len(begun) == 3:
+            kept.session.full_reads_requested += 1  # by this check itself
+        return 1.0
+
+    sleep = here._sleep
+
+    async def request(seconds: float) -> None:
+        assert seconds <= line_watches.EARLY
+        await sleep(seconds)
+        if len(begun) == 2:
+            kept.session.full_reads_requested += 1
+
+    kept.session.clock.sleep = request
+    with pytest.raises(asyncio.CancelledError):
+        await here.watch._again(kept, step, early=True)
+    early = 1.0 + line_watches.EARLY
+    assert begun == pytest.approx([0.0, 1.0, early, early + 1.0], abs=0.001)
+
+
+@pytest.mark.parametrize(("timeout", "pause"), [(4.0, 0.5), (8.0, 1.0), (80.0, 1.0), (None, 1.0)])
+def test_drive_that_failed_is_read_again_within_half_of_its_time(
+    timeout: float | None, pause: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = Watched(monkeypatch).keep()
+    kept.watch = None if timeout is None else TimeoutWatch(timeout, None)
+    assert LineWatch._after_failure(kept) == pause
+
+
+@pytest.mark.parametrize(("drives", "seconds"), [(1, 3.0), (20, 3.0), (24, 3.6)])
+def test_many_drives_are_checked_less_often(
+    drives: int, seconds: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Watched(monkeypatch)
+    for device in range(drives):
+        here.keep(device)
+    assert here.watch.glance_period == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize(
+    ("watch", "known", "kept_for"),
+    [(TRIPS, True, 10.0), (None, True, None), (None, False, UNKNOWN_TIMEOUT), (TRIPS, False, 10.0)],
+)
+async def test_drive_is_kept_alive_by_what_was_learned_of_it(
+    watch: TimeoutWatch | None, known: bool, kept_for: float | None, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Watched(monkeypatch)
+    kept, found = here.keep(), SimpleNamespace(watch=watch, known=known)
+    steps: list[object] = []
+
+    async def check(*those: object) -> None:
+        steps.append(those)
+
+    async def read(*those: object) -> Any:
+        steps.append(those)
+        return found
+
+    monkeypatch.setattr(line_watches, "check_byte_order", check)
+    monkeypatch.setattr(line_watches, "read_timeout", read)
+    monkeypatch.setattr(line_watches, "deciding_codes", lambda _: ("CHCF",))
+    here.done.clear()
+    assert await here.watch._learn(kept) == 20.0
+    assert steps == [("reader 1", Priority.POLL), ("reader 1", Priority.POLL, ("CHCF",))]
+    assert (kept.watch, kept.learned, kept.session.timeout) == (watch, 100.0, found)
+    expected = ("let go", 1) if kept_for is None else ("keep", (1, kept_for))
+    assert here.done == [expected]
+    here.keep()
+    here.done.clear()
+    await here.watch._learn(kept)
+    assert here.done == [], "another session of the drive is kept now"
