@@ -13,6 +13,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "compare": ("compare", "Set up", "Compare settings of files, drives or factory defaults."),
     "counters": ("counters", "Troubleshoot", "Compare frame counts with the drive's own counters."),
     "demo": ("panel", "Profiles", "Open the panel on five running simulated drives."),
+    "export": ("export", "Watch", "Export recorded values as CSV, or frames as pcapng."),
     "hold": ("hold", "Watch", "Keep polling drives so that they do not time out."),
     "identify": ("identify", "Watch", "Show a drive's vendor, model and version."),
     "journal": ("journal", "Watch", "Show writes, trips, runs and lost links of drives."),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +15,7 @@ from ..shared.output import print_json
 from ..shared.registration import command
 from ..shared.rows import Column
 from ..shared.say import say
+from ..shared.times import both_times, time_typed
 
 if TYPE_CHECKING:
     from tui.session.changes import Change, ChangeList
@@ -49,17 +50,6 @@ def _wanted_drive(_ctx: click.Context, _option: click.Parameter, text: str) -> W
     if not 1 <= (device := int(number[:9])) <= 247:
         raise click.BadParameter(f"{number[:9]} is not a slave address. Use 1 to 247.")
     return WantedDrive(device, line)
-
-
-def time_typed(_ctx: click.Context, _option: click.Parameter, text: str | None) -> datetime | None:
-    """The time that was typed, in the local zone."""
-    from tui.session.changes import TIME_EXAMPLES, parse_since
-
-    if text is None:
-        return None
-    if (found := parse_since(text, datetime.now().astimezone())) is None:
-        raise click.BadParameter(f"{text!r} is not a time. Examples: {TIME_EXAMPLES}.")
-    return found
 
 
 @command("Show writes, trips, runs and lost links of drives.", group="Watch")
@@ -170,20 +160,20 @@ def _write_csv(path: Path, found: ChangeList, *, force: bool) -> None:
 
 def _cells(change: Change) -> list[str]:
     """The cells of a change, in the order of `CHANGE_COLUMNS`."""
-    from tui.session.changes import LineLoss, LineRun, local_time
+    from tui.session.changes import LineLoss, LineRun
 
     match change:
         case LineRun(line, run):
             seen = [run.reference, *((f"{run.least} to {run.most}",) if run.least else ())]
             return [
-                *_times(local_time(run.begun)), "run", line, str(run.device), run.profile, "", "",
-                run.direction, *_times(local_time(run.ended)), ", ".join(seen), "", run.who,
+                *both_times(run.begun), "run", line, str(run.device), run.profile, "", "",
+                run.direction, *both_times(run.ended), ", ".join(seen), "", run.who,
                 "" if run.end_within is not None else "still running",
             ]  # fmt: skip
         case LineLoss(line, loss):
-            ended = ("", "") if loss.ended is None else _times(local_time(loss.ended))
+            ended = ("", "") if loss.ended is None else both_times(loss.ended)
             number = "" if loss.device is None else str(loss.device)
-            begun = _times(local_time(loss.begun))
+            begun = both_times(loss.begun)
             return [*begun, "lost", line, number, "", "", "", "", *ended, "", "", "", loss.reason]
         case _:
             return _entry_cells(change)
@@ -193,14 +183,9 @@ def _entry_cells(entry: Entry) -> list[str]:
     from tui.session.journal_reading import time_of
 
     when = time_of(entry)
+    times = both_times(when.timestamp()) if when is not None else (entry.time, "")
     return [
-        *(_times(when) if when is not None else (entry.time, "")), entry.kind, entry.line,
+        *times, entry.kind, entry.line,
         str(entry.device), entry.profile, entry.code, entry.old, entry.new, "", "", "",
         entry.answer, "", entry.why,
     ]  # fmt: skip
-
-
-def _times(when: datetime) -> tuple[str, str]:
-    """A time in UTC and in the local zone, as RFC 3339 has them."""
-    local = when.astimezone().isoformat(timespec="milliseconds")
-    return when.astimezone(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z"), local

@@ -21,11 +21,13 @@ from tui.bus.line_events import (
 )
 from tui.bus.link import label
 from tui.bus.program import Program
+from tui.bus.share.place import file_name_of
 
 from ..event_notes import EVENTS_OF_LINE, PROFILE_OF_DRIVE, LeftEvent
 from ..record.recorder import LineRecorder
-from ..record.ring import record_folder
+from ..record.ring import files_of_line, record_folder
 from ..record.schema import EventRow, to_microseconds
+from .line_key import line_key
 from .named_lines import line_settings
 
 if TYPE_CHECKING:
@@ -64,6 +66,13 @@ def record_line(line: ModbusLine, name: str) -> LineRecorder | None:
 def record_privately(line: ModbusLine, folder: Path) -> LineRecorder:
     """Record a line in a folder of its own, which the caller removes."""
     return RecordedEvents(line, PRIVATE_NAME, folder).recorder
+
+
+def record_files(source: str) -> list[Path]:
+    """Return the files of a record: the one at this path, or those of a line, the oldest first."""
+    if (path := Path(source)).is_file():
+        return [path]
+    return files_of_line(record_folder(), file_name_of(line_key(source)))
 
 
 def may_record() -> bool:

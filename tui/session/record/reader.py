@@ -17,6 +17,7 @@ from .schema import (
     RECORDED_READS,
     EventRow,
     RecordDamaged,
+    ReplyRow,
 )
 
 ROWS_AT_A_TIME = 1000
@@ -201,6 +202,22 @@ class RecordReader:
             if len(rows) < ROWS_AT_A_TIME:
                 return
             last = rows[-1][:2]
+
+    def all_exchanges(self, since: int, until: int) -> Iterator[ReplyRow]:
+        """Yield the exchanges of all devices whose request was sent in a time, in their order."""
+        columns = ", ".join(f"reply.{name}" for name in ReplyRow._fields[:-1])
+        last = -1
+        while True:
+            rows = self._base.execute(
+                f"SELECT reply.id, {columns}, coalesce(who.name, '') FROM reply"
+                " LEFT JOIN who ON who.id = reply.who WHERE reply.id > ? AND utc >= ? AND utc < ?"
+                " ORDER BY reply.id LIMIT ?",
+                (last, since, until, ROWS_AT_A_TIME),
+            ).fetchall()
+            yield from (ReplyRow._make(row[1:]) for row in rows)
+            if len(rows) < ROWS_AT_A_TIME:
+                return
+            last = rows[-1][0]
 
     def last_writer(self, device: int, register: int, since: int, until: int) -> str:
         """Return the program whose write of a register was the last one that the drive took."""
