@@ -18,6 +18,7 @@ from .open_lines import LineEvents, PanelLine
 if TYPE_CHECKING:
     from tui.bus.line_events import LineEvent
     from tui.session.connect.open_line import OpenLine
+    from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
@@ -27,8 +28,6 @@ log = logging.getLogger(__name__)
 CHOSEN_CONNECTS_WITHIN = 4.0
 """Seconds within which a line chosen by a person must connect."""
 
-MONITORED_IN_LEAD = 4
-"""Drives whose curves begin before the time of a replay, if none is open."""
 WAY_TO_ACCEPT = "If this is the right line, press Ctrl+P and type accept."
 
 Opener = Callable[..., "OpenLine"]
@@ -109,18 +108,22 @@ class LineOwner(Panel):
         from tui.session.fleet import Fleet
         from tui.session.replay import UnwrittenJournal, pass_lead, take_drives
 
+        from .monitor.assembly import codes_beside
+
         replay = opened.replay
         assert replay is not None
         events = EventLog(replay.clock.wall)
         fleet = Fleet(replay, UnwrittenJournal(), None, events, replay.clock)
         for text in await asyncio.to_thread(take_drives, replay, fleet):
             self.events.add("alarm", text)
-        monitored = [console for console in fleet.consoles if device in (None, console.device)]
-        for console in monitored[:MONITORED_IN_LEAD]:
-            console.monitor.start(period=self.period)
-        await pass_lead(replay, len(fleet.consoles))
-        for console in monitored:
-            console.monitor.stop()
+
+        def monitor(console: DriveConsole) -> None:
+            beside = codes_beside(console.session.profile)
+            console.monitor.start(period=self.period, extra=beside)
+
+        if device is None and len(fleet.consoles) == 1:
+            device = fleet.consoles[0].device
+        await pass_lead(replay, fleet, device, monitor, self.period)
         return PanelLine(opened, fleet)
 
     def open_line_of(self, text: str) -> PanelLine | None:

@@ -173,4 +173,3 @@ class ReplayKeys(StatusRefresher, LineOwner, Places):
     def _show_moved(self) -> None:
         """Show the new time at once."""
         self.draw_frame()
-        self._ask_screen("look")

@@ -69,9 +69,11 @@ class Arming:
     @property
     def hindrance(self) -> str:
         """Why the drive cannot be armed now; empty if it can."""
+        if self.barred:
+            return self.barred
         if self._line.read_only:
             return "The line is read-only: nothing is written."
-        return self._line.held or self.barred or self.trouble()
+        return self._line.held or self.trouble()
 
     def disarm(self, why: str = "") -> None:
         """Refuse all writes from now on; `why` is shown to a person."""

@@ -18,6 +18,9 @@ from tui.drive.profile.profile import Profile
 from .clock import REAL_CLOCK, Clock
 from .reading import Origin, Reading
 
+NEVER_READ = 0.0
+"""Time of the reading of a register that was not read yet in a replay: nothing is known of it."""
+
 
 @dataclass(frozen=True)
 class _State:
@@ -103,7 +106,7 @@ class RegisterImage:
         with self._lock:
             held, refused = dict(self._now.held), dict(self._now.refused)
             for code, reading in found.items():
-                if reading.time < self._doubted.get(code, -math.inf):
+                if reading.time == NEVER_READ or reading.time < self._doubted.get(code, -math.inf):
                     continue
                 before = held.get(code) or refused.get(code)
                 if before is not None and before.time > reading.time:

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from contextlib import suppress
 from typing import NamedTuple
 
+from tui.bus.api import Priority
+from tui.bus.errors import LineError
 from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
@@ -12,13 +16,17 @@ from tui.drive.profile.profile import Profile, digest_of
 from tui.drive.values import word_count
 
 from .connect.identify import DriveIdentity, identity_from
+from .console import DriveConsole
 from .drive import DriveSession
 from .fleet import Fleet
 from .journal import Entry, Journal
+from .read.reader import Reader
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 
 EXACT_LEAD = 60.0
 """Seconds before the time of a replay that pass as they were."""
+MONITORED_IN_LEAD = 4
+"""Drives whose curves begin before the time of a replay, if none is open."""
 LEAD_SLEEP = 5.0
 """Seconds of each sleep in those before; more with many drives."""
 OTHER_PROFILE = (
@@ -79,7 +87,7 @@ def take_drives(line: ReplayLine, fleet: Fleet) -> list[str]:
             continue
         line.use_means(device, _means(profile).get)
         session = DriveSession(line, device, profile, identity, line.clock)
-        session.arming.why_disarmed = REPLAY_SENDS_NOTHING
+        session.arming.barred = REPLAY_SENDS_NOTHING
         fleet.take(session)
         if named.hash and named.hash != digest_of(profile):
             reported.append(OTHER_PROFILE.format(device=device, profile=id))
@@ -107,11 +115,44 @@ def _means(profile: Profile) -> dict[tuple[int, int], bool]:
     return found
 
 
-async def pass_lead(line: ReplayLine, drives: int) -> None:
-    """Go from the lead to the time of the replay, with all that happened on the way."""
-    clock, exact = line.clock, line.at - EXACT_LEAD
+async def _take_known(line: ReplayLine, session: DriveSession) -> None:
+    """Have a session know all that was read of its drive by now, by any program."""
+    known, reader = line.known_registers(session.device), Reader(session)
+    for parameter in session.profile.data.parameters:
+        places = range(parameter.address, parameter.address + word_count(parameter))
+        if all((parameter.function, register) in known for register in places):
+            with suppress(LineError, DriveError):
+                await reader.read([parameter.code], priority=Priority.POLL)
+
+
+async def pass_lead(
+    line: ReplayLine,
+    fleet: Fleet,
+    device: int | None,
+    monitor: Callable[[DriveConsole], None],
+    period: float,
+) -> None:
+    """Go from the lead to the time of the replay, with all that happened on the way.
+
+    `monitor` starts the monitor of the drive `device`; without one, of some drives for a while.
+    """
+    clock, drives = line.clock, fleet.consoles
+    exact = line.in_step(device, max(clock.monotonic(), line.at - EXACT_LEAD), period)
     if clock.monotonic() < exact:
-        clock.least_sleep = max(LEAD_SLEEP, float(drives))
+        clock.least_sleep = max(LEAD_SLEEP, float(len(drives)))
         await line.run_to(exact)
         clock.least_sleep = 0.0
+    for console in drives:
+        await _take_known(line, console.session)
+    shown = [console for console in drives if device in (None, console.device)]
+    for console in shown[:MONITORED_IN_LEAD]:
+        monitor(console)
     await line.run_to(line.at)
+    for console in shown[:MONITORED_IN_LEAD]:
+        if device is None:
+            console.monitor.stop()
+        else:
+            monitor(console)  # reads all values of this time, also those of the slow rate
+    for console in drives:  # what was not read at the begin may have been read since
+        await _take_known(line, console.session)
+        fleet.line_watch.keep(console.session, console.monitor)

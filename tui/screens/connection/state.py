@@ -179,8 +179,9 @@ class LineView(PanelScreen):
         super().draw(width)
         self._follow_line()
         self._redraw(lines=len(self.app.panel_lines) > 1)
-        if self.app.fleet is not None and not (self.search and self.search.goes_on):
-            self._warn(self.app.fleet.line_watch.looks)
+        fleet = self.app.fleet if self.app.replay is None else None
+        if fleet is not None and not (self.search and self.search.goes_on):
+            self._warn(fleet.line_watch.looks)
 
     # The drives
 

@@ -18,6 +18,7 @@ from tui.drive.values import Value, from_words, percent_of, word_count
 from tui.safety import SOURCE_AGE
 
 from ..drive import DriveSession
+from ..image import NEVER_READ
 from ..reading import Origin, Reading
 from ..shown import Rating
 from .kept_plans import KeptPlans, planned_read, planned_reads
@@ -364,5 +365,5 @@ class Reader:
         absent = refusal.code == self.profile.data.reading.unknown_exception
         now = self.session.clock.monotonic()
         if isinstance(refusal, NotRecorded):
-            now -= ASK_AGAIN  # a replay may come to its first value at any time
+            now = NEVER_READ
         return Reading.bad(parameter, now, str(refusal), absent=absent)

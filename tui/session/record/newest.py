@@ -24,7 +24,17 @@ from tui.bus.requests import REFERENCE, Objects, own_words_of
 
 from .reader import RecordReader
 from .reduction import extent_of
-from .schema import GOOD, QUALITIES, RECORDED_READS, REFUSED, SILENT, EventRow, RecordDamaged
+from .schema import (
+    DAMAGED,
+    GOOD,
+    QUALITIES,
+    RECORDED_READS,
+    REFUSED,
+    SILENT,
+    WRONG,
+    EventRow,
+    RecordDamaged,
+)
 
 ROWS_AHEAD = 500
 """Rows that are read in one query while a replay goes on."""
@@ -32,7 +42,6 @@ SOUGHT_AGAIN = 1_000_000
 """Microseconds after which the end of a file is read again: it may still be written."""
 REPEATED_WITHIN = 2_000_000
 """Microseconds within which a repeated request replaces the failed one before it."""
-_DAMAGED, _WRONG = 3, 4
 _NEVER = 1 << 62
 _REPLY = "utc, utc + took, id, function, address, registers, quality, words, received, repeat"
 _REDUCED = "utc, utc + took, id, function, address, registers, good, words"
@@ -77,11 +86,11 @@ class RecordedReply(NamedTuple):
         if self.quality == REFUSED:
             code = self.received[1] if self.received and len(self.received) > 1 else 0
             return DeviceException(*place, code)
-        if self.quality == _DAMAGED:
+        if self.quality == DAMAGED:
             return ChecksumFault(*place, received=self.received or b"")
         if self.quality == SILENT:
             return NoAnswer(*place)
-        detail = "" if self.quality == _WRONG else QUALITIES[self.quality]
+        detail = "" if self.quality == WRONG else QUALITIES[self.quality]
         return WrongReply(*place, detail, self.received or b"")
 
 
@@ -152,6 +161,10 @@ class ReplayReader(RecordReader):
             (device, last[0], *last),
         ).fetchall()
 
+    def replies_from(self, device: int, at: int) -> list[RecordedReply]:
+        """Return the replies of a device that follow a time."""
+        return [_reply_in(row) for row in self.following("reply", device, (at, -1))]
+
     def identification(self, device: int, function: int) -> IdentificationObjects | None:
         """Return what a device reported by function 43 or 17; None if that is not recorded."""
         rows = self._base.execute(
@@ -208,7 +221,8 @@ class NewestReplies:
         self._ended = ended
         self._at: int | None = None
         self._raw_since = reader.raw_since(device)
-        self._by_register: dict[tuple[int, int], RecordedReply] = {}
+        self.by_register: dict[tuple[int, int], RecordedReply] = {}
+        """The newest replies to reads, by function and register."""
         self._refused: dict[tuple[int, int, int], RecordedReply] = {}
         self._tables = {"reply": _Following(), "reduced": _Following()}
         self.heard: int | None = None
@@ -228,14 +242,13 @@ class NewestReplies:
             self._begin_before(at)
         self._at = at
         for table, following in self._tables.items():
-            for reply in following.until(at, partial(self._read, table)):
-                if self._take(reply):
+            for reply, repeated in following.until(at, partial(self._read, table)):
+                if repeated or self._take(reply):
                     self._ended(reply)
 
     def _before_repeat(self, at: int) -> int:
         """Return a time before the last try, if that failed and is repeated soon."""
-        rows = self._reader.following("reply", self._device, (at - REPEATED_WITHIN, -1))
-        replies = [_reply_in(row) for row in rows]
+        replies = self._reader.replies_from(self._device, at - REPEATED_WITHIN)
         for reply, following in reversed(list(pairwise(replies))):
             if reply.ended <= at < following.ended and is_repeated(reply, following):
                 return self._before_repeat(reply.sent - 1)
@@ -269,7 +282,7 @@ class NewestReplies:
             return True
         for register in range(reply.address, reply.address + reply.registers):
             place = reply.function, register
-            self._by_register[place] = _later(self._by_register.get(place), reply)
+            self.by_register[place] = _later(self.by_register.get(place), reply)
         return True
 
     def words(self, function: int, address: int, count: int) -> tuple[tuple[int, ...], int]:
@@ -278,7 +291,7 @@ class NewestReplies:
         Raises NotRecorded for registers that were not read, or not by one request.
         """
         places = range(address, address + count)
-        found = [self._by_register.get((function, register)) for register in places]
+        found = [self.by_register.get((function, register)) for register in places]
         newest = max((reply.ended for reply in found if reply is not None), default=0)
         refused = self._refused.get((function, address, count))
         if refused is not None and refused.ended >= newest:
@@ -314,9 +327,9 @@ class _Following:
 
     def until(
         self, at: int, read: Callable[[tuple[int, int]], tuple[list[RecordedReply], Any]]
-    ) -> list[RecordedReply]:
-        """Return the replies that have ended since the last call."""
-        found: list[RecordedReply] = []
+    ) -> list[tuple[RecordedReply, bool]]:
+        """Return the replies that have ended since the last call; True for a repeated request."""
+        found: list[tuple[RecordedReply, bool]] = []
         while True:
             if not self._ahead and at >= self._sought:
                 rows, self.last = read(self.last)
@@ -327,8 +340,8 @@ class _Following:
                 return found
             reply = self._ahead.popleft()
             repeated = bool(self._ahead) and is_repeated(reply, self._ahead[0])
-            if reply.ended > self.skip and not repeated:
-                found.append(reply)
+            if reply.ended > self.skip:
+                found.append((reply, repeated))
 
 
 def is_repeated(reply: RecordedReply, following: RecordedReply) -> bool:

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import sqlite3
 import threading
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Collection, Coroutine, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -43,13 +44,19 @@ from tui.bus.trace import Frame
 
 from .newest import MeanOf, NewestReplies, RecordedReply, ReplayReader
 from .replay_clock import ReplayClock
-from .schema import GOOD, REFUSED, SILENT, EventRow, RecordDamaged, to_microseconds
+from .schema import COPY, GOOD, REFUSED, SILENT, EventRow, RecordDamaged, to_microseconds
 
 T = TypeVar("T")
 
 REPLAY_SENDS_NOTHING = "This is a replay: nothing is sent to a drive."
 NO_HOST = "replay.invalid"
 """A name that no host can have: the line of a replay must never be reached."""
+PAUSE_OF_CYCLES = 0.1
+"""Seconds without a request that end a cycle of a monitor."""
+STEP_MARGIN = 0.03
+"""Seconds from the end of a recorded cycle to that of the replay: the recorded ones vary."""
+SOUGHT_PAUSES = 5
+"""Periods before the time of a replay in which its cycles are sought."""
 STARTS_WITHIN = 10.0
 """Seconds within which the thread of a line starts and ends."""
 _EVENTS = ("fault", "stop", "done", "failed", "alarm", "trigger", "notice", "commander")
@@ -118,6 +125,31 @@ class ReplayLine:
         except sqlite3.Error as error:
             raise LineFailed(f"The record cannot be read: {error}.") from error
 
+    def in_step(self, device: int | None, since: float, period: float) -> float:
+        """Return a time from `since` on at which cycles of a period end as the recorded ones do.
+
+        `since` itself if the reads of a device have no pauses before the time of the replay.
+        """
+        if device is None:
+            return since
+        last = max(since, self.at - SOUGHT_PAUSES * period)
+        with self._lock:
+            replies = self._reader.replies_from(device, to_microseconds(last))
+        ends = [
+            reply.ended / 1e6
+            for reply, following in pairwise(replies)
+            if following.sent - reply.ended > PAUSE_OF_CYCLES * 1e6
+        ]
+        ends = [end for end in ends if end <= self.at]
+        if not ends:
+            return since
+        return since + (ends[-1] + STEP_MARGIN - since) % period
+
+    def known_registers(self, device: int) -> Collection[tuple[int, int]]:
+        """Return the registers that were read by now, with the function of the read."""
+        with self._lock:
+            return set(self._of(device).by_register)
+
     def use_means(self, device: int, mean_of: MeanOf) -> None:
         """Set which registers of a device have a mean, for replies that were reduced."""
         with self._lock:
@@ -135,10 +167,12 @@ class ReplayLine:
 
     def _count(self, device: int, reply: RecordedReply) -> None:
         """Count an exchange of the record, as the line counted it then."""
+        if reply.quality > COPY:
+            return
         tally = self._tally
         tally.count_sent(device, 0)
         tally.count_end(device, (reply.ended - reply.sent) / 1e6, 0)
-        if reply.quality in (GOOD, REFUSED):
+        if reply.quality in (GOOD, REFUSED, COPY):
             tally.count_reply(device, (reply.ended - reply.sent) / 1e6)
             tally.count_good(device, was_heard=True)
             if reply.quality == REFUSED:

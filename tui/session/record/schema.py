@@ -28,7 +28,7 @@ QUALITIES = {
     8: "frame without a request",
 }
 """Names of `quality`, which the file has as a table too."""
-GOOD, REFUSED, SILENT, STRAY = 0, 1, 2, 8
+GOOD, REFUSED, SILENT, DAMAGED, WRONG, COPY, STRAY = 0, 1, 2, 3, 4, 5, 8
 RECORDED_READS = (3, 4)
 """Functions whose rows are reduced."""
 _READING = (3, 4, 23)
