@@ -250,7 +250,8 @@ class LineView(PanelScreen):
             text.append(line.opened.label, STRONG if shown else PLAIN)
             text.append(f" {len(line.fleet.found)}  ", FAINT)
         for key, does in ((".", "drive"), ("n", "new"), ("Tab", "lines")):
-            text.append(f" {key}", KEY).append(f" {does}  ", FAINT)
+            if text.cell_len + len(f" {key} {does}") <= self.size.width:
+                text.append(f" {key}", KEY).append(f" {does}  ", FAINT)
         return text
 
     def _drives_title(self, width: int, rows: Mapping[int, WallRow] = NOBODY) -> list[Text]:

@@ -87,7 +87,7 @@ def curve_lines(view: View, room: Arrangement) -> list[Text]:
     columns = room.width - LABEL_CELLS - 1 - MARGIN_CELLS
     points = points_of_page(view)
     page = ShownPage(view, points, columns, marks_on_page(view, points, columns))
-    names = mark_names(page, room.axis)
+    names = mark_names(page)
     unnamed = {mark for mark in page.marks.values() if mark not in names}
     lines = [_heading(view, found[0], unnamed, room.width)]
     lines += _band_lines(page, found[0], room.plot)

@@ -159,7 +159,9 @@ def _heading(
     reading = view.reading(parameter.code) if parameter else None
     if reading is not None and reading.quality is not Quality.GOOD and reading.raw is not None:
         age = Text(f" {age_text(reading.age(view.now))} old ", STALE)
-        text.truncate(max(0, inner - age.cell_len))
+        left = inner - age.cell_len
+        if text.cell_len > left:  # a whole name or the unit, no part of a name
+            text = Text(title, PLAIN) if len(title) <= left else Text(short(unit, left), FAINT)
         return text, age
     if quantity == "output_frequency" and (wanted := _reference(view)) is not None:
         right = wanted.drawn(

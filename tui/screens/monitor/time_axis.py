@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from bisect import bisect_left
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping, Sequence, Set
 from itertools import groupby
 from operator import itemgetter
 from typing import NamedTuple
@@ -117,15 +117,12 @@ class MarkName(NamedTuple):
     text: str
 
 
-def mark_names(page: ShownPage, rows: int) -> dict[TrendMark, MarkName]:
+def mark_names(page: ShownPage) -> dict[TrendMark, MarkName]:
     """Return the name of each mark, at the first of its signs that has room for it.
 
-    A name never covers a sign, or a clock time on an axis of one row.
+    A name never covers a sign.
     """
     taken = [False] * (page.columns + MARGIN_CELLS)
-    if rows == 1:
-        times = clock_times(page, rows)
-        taken = [character != " " for character in times]
     for column in page.marks:
         taken[column] = True
     found: dict[TrendMark, MarkName] = {}
@@ -154,7 +151,10 @@ def axis_lines(page: ShownPage, rows: int, names: Mapping[TrendMark, MarkName]) 
     cells += [(" ", FAINT)] * (end - columns)
     for column, _ in ticks:
         cells[column] = ("┬", FAINT) if column <= reached else ("╷", LINE)
-    times = clock_times(page, rows)
+    covered = {
+        cell for name in names.values() for cell in range(name.column, name.column + len(name.text))
+    }
+    times = clock_times(page, {*page.marks, *covered} if rows == 1 else set())
     if rows == 1:
         cells = [
             (times[column], FAINT) if times[column] != " " else cell
@@ -214,10 +214,10 @@ FULL_CELLS = 10
 """Least columns between two ticks for clock times in full."""
 
 
-def clock_times(page: ShownPage, rows: int) -> str:
+def clock_times(page: ShownPage, covered: Set[int]) -> str:
     """Return the row of clock times, centered on their ticks.
 
-    Times that overlap are omitted, and on an axis of one row those that a mark would cover.
+    Times that overlap are omitted, and those in a `covered` column.
     """
     columns, step = page.columns, page.view.step
     cells = [" "] * (columns + MARGIN_CELLS)
@@ -234,7 +234,7 @@ def clock_times(page: ShownPage, rows: int) -> str:
         at = column - len(text) // 2
         if at < end or at + len(text) > len(cells):
             continue
-        if rows == 1 and any(cell in page.marks for cell in range(at, at + len(text))):
+        if not covered.isdisjoint(range(at, at + len(text))):
             continue
         whole = whole or len(text) == 8
         cells[at : at + len(text)] = text
