@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import pytest
 from rich.color import ColorSystem
+from textual.pilot import Pilot
 
 from tests.sweeps import kept
 from tui.terminal.abilities import ASCII, Abilities
 
+from . import fakes
 from .test_command_pictures import shown_over
+from .test_line_pictures import STATES, same_ports
 from .test_monitor_pictures import SCENES, panel, show
 from .test_pictures import Compare
 
 pytestmark = pytest.mark.drawn
+__all__ = ["same_ports"]
 
 POOR = {
     "plain signs": Abilities(ASCII),
@@ -37,6 +41,36 @@ def test_monitor_on_a_poor_terminal(
     assert snap_compare(
         app, terminal_size=(80, 24), run_before=lambda pilot: show(app, screen, keys, pilot)
     )
+
+
+FEWER_COLORS = ("sixteen colors", "no colors")
+
+
+@pytest.mark.parametrize("terminal", FEWER_COLORS)
+@pytest.mark.parametrize("name", kept(["running", "fault", "not-heard"], "fault"))
+def test_monitor_on_a_small_poor_terminal(
+    snap_compare: Compare, name: str, terminal: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, screen = panel(SCENES[name], monkeypatch, POOR[terminal])
+    assert snap_compare(
+        app, terminal_size=(60, 16), run_before=lambda pilot: show(app, screen, (), pilot)
+    )
+
+
+@pytest.mark.usefixtures("same_ports")
+@pytest.mark.parametrize("terminal", FEWER_COLORS)
+@pytest.mark.parametrize("size", [(80, 24), (60, 16)], ids=lambda size: f"{size[0]}x{size[1]}")
+@pytest.mark.parametrize("state", kept(["thirty-one", "lost-drive"], "thirty-one"))
+def test_list_of_drives_on_a_poor_terminal(
+    snap_compare: Compare, state: str, size: tuple[int, int], terminal: str
+) -> None:
+    app = fakes.app_of(abilities=POOR[terminal])
+
+    async def shown(pilot: Pilot[None]) -> None:
+        await pilot.pause()
+        await STATES[state](app, pilot)
+
+    assert snap_compare(app, terminal_size=size, run_before=shown)
 
 
 @pytest.mark.parametrize("terminal", ["vt100", "sixteen colors"])
