@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 from tui.session.monitor.fault_record import Recorder, record_name, record_text
 from tui.session.reading import reading_of
@@ -110,3 +113,13 @@ async def test_fault_read_after_the_state_is_in_the_record() -> None:
         assert recorder.latest.fault is None
         recorder.take(tripped)
         assert recorder.latest.fault == tripped.state.fault
+
+
+def test_name_of_a_record_has_its_drive_time_and_fault() -> None:
+    session: Any = SimpleNamespace(profile=SimpleNamespace(id="atv71"), device=4)
+    record: Any = SimpleNamespace(wall=1795741236.9, fault=SimpleNamespace(code="O/b F"))
+    when = time.strftime("%Y%m%d-%H%M%S", time.localtime(1795741236))
+    assert len(when) == 15
+    assert record_name(session, record) == f"trip-atv71-4-{when}-ObF.md"
+    record.fault = None
+    assert record_name(session, record) == f"trip-atv71-4-{when}-fault.md"

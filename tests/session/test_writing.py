@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from tui.bus.api import Priority
+from tui.bus.api import Priority, Reply
 from tui.bus.errors import DeviceException, LineError, NoAnswer, RequestRefused, Superseded
 from tui.bus.fake_device import FakeDevice
 from tui.bus.requests import WriteOne
@@ -19,7 +19,13 @@ from tui.session.drive import DriveSession
 from tui.session.journal import Entry, Journal
 from tui.session.journal_reading import completed, read_journal
 from tui.session.read.reader import Reader
-from tui.session.settings.write import CUT_SHORT, NotTaken, Writer
+from tui.session.settings.write import (
+    CUT_SHORT,
+    NotTaken,
+    Writer,
+    device_refusal,
+    parameter_entry,
+)
 from tui.session.work import Permit, Stopped
 
 from .fakes import OneDrive, parameter, profile_of
@@ -347,3 +353,141 @@ async def test_refused_write_is_journaled_with_its_reply(
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     await Reader(session).read(["ACC"])
     assert [entry.kind for entry in abilities_in(journal)] == ["write"]
+
+
+# -- how a frame is handed to the line -------------------------------------------------------------
+
+
+class Handed(WilfulLine):
+    """A line that notes how each request is handed to it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.how: list[tuple[str, int, dict[str, Any]]] = []
+
+    async def read(self, device: int, address: int, count: int = 1, **how: Any) -> Reply:
+        self.how.append(("read", address, {"count": count, **how}))
+        return await super().read(device, address, count, **how)
+
+    async def write(self, device: int, address: int, values: Any, **how: Any) -> float:
+        self.how.append(("write", address, how))
+        return await super().write(device, address, values, **how)
+
+
+@pytest.mark.parametrize(("replaceable", "within"), [(False, None), (True, 0.25)])
+async def test_write_of_a_task_is_forbidden_once_its_permit_ends(
+    replaceable: bool, within: float | None, journal: Journal
+) -> None:
+    line = Handed()
+    session = DriveSession(line, 1, PROFILE)
+    session.arming.arm(seconds=math.inf)
+    permit = session.work.permit()
+    await Reader(session).read(["INR"])
+    line.how.clear()
+    writing = Writer(session, journal, permit)
+    await writing.write_parameter(
+        PROFILE["ACC"], 50, why="a test", replaceable=replaceable, within=within
+    )
+    priority = Priority.OPERATOR_WRITE
+    assert line.how == [
+        ("write", 10, {
+            "priority": priority, "replaceable": replaceable, "forbidden": permit.refusal,
+            "within": within,
+        }),
+        ("read", 10, {"count": 1, "priority": priority, "function": 3}),
+    ]  # fmt: skip
+
+
+async def test_write_of_a_stop_has_no_permit_and_reads_nothing(journal: Journal) -> None:
+    line = Handed()
+    session = DriveSession(line, 1, PROFILE)
+    await Writer(session, journal, None).write_parameter(
+        PROFILE["CMD"], 7, why="a stop", priority=Priority.STOP, read_back=False
+    )
+    how = {"priority": Priority.STOP, "replaceable": False, "forbidden": None, "within": None}
+    assert line.how == [("write", 12, how)]
+    assert not session.arming.armed
+    (entry,) = journal.recent
+    assert (entry.code, entry.new_raw, entry.answer, entry.read_back) == ("CMD", 7, "ok", None)
+    assert (entry.why, entry.address, entry.device, entry.profile) == ("a stop", 12, 1, "small")
+
+
+async def test_write_without_a_read_back_is_not_compared(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    line.drive.keeps = lambda _address, _word: 7
+    await writer(session, journal).write_parameter(PROFILE["INR"], 1, why="a test", read_back=False)
+    assert line.requested == []
+    assert "INR" not in session.image.raws
+    (entry,) = journal.recent
+    assert (entry.answer, entry.read_back) == ("ok", None)
+
+
+async def test_field_keeps_the_other_bits_of_its_word(journal: Journal) -> None:
+    functions = [{"code": 3, "name": "Read", "max_read": 29}, {"code": 6, "name": "Write"}]
+    fields = (parameter("LOW", 10, mask=0x000F), parameter("HIGH", 10, mask=0x00F0))
+    profile = profile_of(*fields, functions=functions)
+    line = Handed()
+    line.registers[10] = 0xAB53
+    session = DriveSession(line, 1, profile)
+    session.arming.arm(seconds=math.inf)
+    await writer(session, journal).write_parameter(profile["HIGH"], 0x90, why="a test")
+    assert line.written == [(10, 0xAB93)]
+    assert session.image.raws["HIGH"] == 0x90
+    assert [what[:2] for what in line.how] == [("read", 10), ("write", 10), ("read", 10)]
+    assert {what[2]["priority"] for what in line.how} == {Priority.OPERATOR_WRITE}
+
+
+@pytest.mark.parametrize(
+    ("check", "back", "text"),
+    [
+        (0xFFFF, 50, "Accepted: it holds 5.0 s, read back later."),
+        (0xFFFF, 51, "Not accepted: it holds 5.1 s, read back later."),
+        (0x00FE, 51, "Accepted: it holds 5.1 s, read back later."),
+        (0, 99, "It holds 9.9 s, read back later."),
+    ],
+)
+async def test_later_read_completes_the_entry_by_the_bits_that_were_to_be_written(
+    check: int, back: int, text: str, session: DriveSession, journal: Journal,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    added: list[Entry] = []
+    monkeypatch.setattr(journal, "add", added.append)
+    await Reader(session).read(["INR"])
+    acc = PROFILE["ACC"]
+    entry = parameter_entry(session, acc, old=30, new=50, answer="no answer", why="a test")
+    writer(session, journal).complete_later(entry, acc, check)
+    session.image.confirm("ACC", back, 5.0)
+    session.image.confirm("ACC", 77, 6.0)
+    (found,) = added
+    assert (found.kind, found.of, found.answer, found.read_back) == (
+        "read-back", entry.time, text, back,
+    )  # fmt: skip
+    assert (found.code, found.why) == ("ACC", "a test")
+
+
+EXCEPTIONS = [
+    {
+        "code": 4,
+        "name": "Failure",
+        "meaning": "It is out of range",
+        "remedy": "Type another",
+    },
+    {"code": 5, "name": "Acknowledge", "meaning": ""},
+]
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [
+        (4, "The drive refused P1 with exception 4, Failure. It is out of range. The drive is"
+         " running. Type another."),
+        (5, "The drive refused P1 with exception 5, Acknowledge. The drive is running."),
+        (9, "The drive refused P1 with exception 9, which no document of this family explains. The"
+         " drive is running."),
+    ],
+)  # fmt: skip
+def test_refusal_of_a_write_has_the_meaning_of_its_family(code: int, text: str) -> None:
+    profile = profile_of(parameter("P1", 1), exceptions=EXCEPTIONS)
+    refusal = DeviceException(1, 6, 1, code)
+    assert device_refusal(profile, profile["P1"], refusal, "running") == text

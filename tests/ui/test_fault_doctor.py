@@ -482,3 +482,12 @@ def test_history_shows_as_many_faults_as_fit_and_the_one_under_the_cursor(
         assert first == max(1, cursor + 2 - height), "no further than the cursor needs"
     assert lines[0].split()[0] == "History"
     assert all(not line[:LABEL].strip() for line in lines[1:])
+
+
+def test_fault_without_a_time_says_if_it_is_present() -> None:
+    gone = reported(view(18, present=False))
+    assert "no longer present" in gone
+    assert "before monitoring" not in gone
+    present = reported(view(18))
+    assert "tripped before monitoring began" in present
+    assert "no longer present" not in present
