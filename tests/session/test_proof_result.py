@@ -10,7 +10,7 @@ from tui.bus.fake import FakeLine
 from tui.drive.profile import library
 from tui.session.drive import DriveSession
 from tui.session.proof.result import ProofResult, proof_entry
-from tui.session.proof.silences import Bracket
+from tui.session.proof.silences import Bracket, silences
 
 PROFILE = library.load("atv312")
 RULES = PROFILE.data.communication_fault
@@ -82,3 +82,34 @@ def test_result_has_a_journal_entry(result: ProofResult, verdict: str) -> None:
     assert (entry.new, entry.answer) == (result.text, verdict)
     assert (entry.why, entry.kind) == ("test of the communication timeout", "proof")
     assert (entry.old_raw, entry.new_raw, entry.read_back) == (None, 0, None)
+
+
+def test_silences_grow_around_the_timeout_and_end_at_three_times_it() -> None:
+    shares = (0.25, 0.5, 0.7, 0.82, 0.94, 1.06, 1.18, 1.6, 2.2, 3.0)
+    assert list(silences(10.0)) == pytest.approx([10.0 * share for share in shares])
+    assert max(silences(40.0)) == 90.0
+    assert list(silences(40.0)).count(90.0) == 1, "none is tried twice"
+    assert max(silences(100.0)) == pytest.approx(160.0)
+
+
+@pytest.mark.parametrize(
+    ("after", "timeout", "agrees"),
+    [
+        (2.5, 2.0, True), (2.5, 1.91, True), (2.5, 1.90, False), (2.5, 2.62, True),
+        (2.5, 2.64, False), (None, 2.2, False), (0.5, 0.5, False),
+    ],
+)  # fmt: skip
+def test_timeout_agrees_with_what_was_measured_within_a_twentieth(
+    after: float | None, timeout: float, agrees: bool
+) -> None:
+    found = Bracket(2.0, after)
+    assert found.holds(timeout) is agrees
+
+
+def test_bracket_is_narrowed_by_each_silence() -> None:
+    bracket = Bracket().alive(1.0).alive(3.0).alive(2.0)
+    assert (bracket.not_before, bracket.not_after, bracket.measured) == (3.0, None, None)
+    assert bracket.reacted(5.0) == Bracket(3.0, 5.0)
+    assert bracket.reacted(5.0).measured == 4.0
+    assert bracket.reacted(2.0) == Bracket(3.0, 3.0)
+    assert bracket.reacted(5.0).alive(4.0) == Bracket(4.0, 5.0)
