@@ -30,6 +30,7 @@ from threading import Lock
 from typing import TypeVar
 
 from tests.defects import (
+    acceptance,
     bus,
     commanding,
     counting,
@@ -57,6 +58,7 @@ COPIED = (
     "constraints.txt", "hatch_build.py", "README.md", "CHANGELOG.md", "CONTRIBUTING.md", "LICENSE",
 )  # fmt: skip
 DEFECTS: tuple[Defect, ...] = (
+    *acceptance.DEFECTS,
     *bus.DEFECTS,
     *drive.DEFECTS,
     *commanding.DEFECTS,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from contextlib import nullcontext
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -54,6 +55,19 @@ def test_test_without_arming_is_refused(file: Path) -> None:
 def test_test_without_a_person_is_refused(file: Path) -> None:
     output = refused(5, "accept", file, "sim:atv312", "--arm")
     assert "needs a person at the keyboard of a terminal" in output
+
+
+@pytest.mark.parametrize(
+    ("terminal", "group", "here"), [(True, 7, True), (True, 8, False), (False, 7, False)]
+)
+def test_person_is_here_at_a_terminal_in_the_foreground(
+    terminal: bool, group: int, here: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(keyboard, "may_ask", lambda: terminal)
+    monkeypatch.setattr(keyboard, "sys", SimpleNamespace(stdin=SimpleNamespace(fileno=lambda: 0)))
+    system = SimpleNamespace(name="posix", tcgetpgrp=lambda _: group, getpgrp=lambda: 7)
+    monkeypatch.setattr(keyboard, "os", system)
+    assert keyboard.person_is_here() == here
 
 
 def test_bad_file_is_refused_before_the_line_is_opened(file: Path) -> None:

@@ -104,8 +104,8 @@ async def nothing() -> None:
 
 
 async def endless() -> None:
-    """Steps that never end."""
-    await asyncio.sleep(60)
+    """Steps that are not over when the motion ends."""
+    await asyncio.sleep(5)
 
 
 async def test_motion_ends_with_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
