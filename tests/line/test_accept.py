@@ -29,12 +29,12 @@ from .test_shared_programs import on_record, stopped_by_commands
 
 LONG = 170.0
 """Seconds within which a whole test ends."""
-SETS = {"ttO": 20, "ACC": 10, "dEC": 10}
-"""Settings of the drives here: timeout 2 s, ramps of 1 s."""
+SETS = {"ttO": 20, "ACC": 30, "dEC": 30}
+"""Settings of the drives here: timeout 2 s, ramps of 3 s."""
 RUN = '\n[[steps]]\nkind = "direction"\nhz = 30\nseconds = 60\n'
 STEPS = {
     "direction": 'kind = "direction"\nhz = 5\nseconds = 0.5',
-    "ramp": 'kind = "ramp"\nhz = 50\nup = 1.0\ndown = 1.0',
+    "ramp": 'kind = "ramp"\nhz = 50\nup = 3.0\ndown = 3.0',
     "limit": 'kind = "limit"\nseconds = 1',
     "loss": 'kind = "communication-loss"\ntimeout = 2.0',
     "loss turning": 'kind = "communication-loss"\ntimeout = 2.0\nturning = true\nhz = 20',
@@ -197,10 +197,16 @@ def test_example_of_a_family_passes(profile: str, tmp_path: Path) -> None:
         assert f"]({name})" in text
 
 
+def unfolded(text: str) -> str:
+    """Text without the line ends of a narrow terminal."""
+    return " ".join(text.split())
+
+
 def test_steps_on_the_run_pass(tmp_path: Path) -> None:
     steps = [STEPS[name] for name in ("ramp", "stop", "limit", "loss turning", "reset")]
     with drive() as (simulation, line), accepting(written(tmp_path, *steps), line) as program:
         program.answer()
+        assert "forward at HSP = 50 Hz, then with a reference 1 Hz ABOVE" in unfolded(program.text)
         assert program.end() == 0, program.text
         assert stands(simulation)
         assert simulation.drive(1).fault is None
@@ -332,6 +338,16 @@ def test_test_in_the_background_is_refused(tmp_path: Path) -> None:
         assert program.end() == 5, program.text
         assert "in the background" in program.text
         assert "[y/N]" not in program.text
+
+
+def test_motor_that_does_not_stop_is_reported(tmp_path: Path) -> None:
+    with motor_of_a_test(tmp_path) as (simulation, _, program):
+        simulation.drive(1).busy = True
+        program.type("\n")
+        assert program.end() == 4, program.text
+        assert "NOT STOPPED" in program.text
+        assert not program.result["passed"]
+        simulation.drive(1).busy = False
 
 
 def test_second_test_of_the_same_drive_is_refused(tmp_path: Path) -> None:

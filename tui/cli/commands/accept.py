@@ -38,6 +38,7 @@ from ..shared.say import say
 from ..shared.sets import write_down
 
 if TYPE_CHECKING:
+    from tui.session.acceptance.high_speed import HighSpeed
     from tui.session.acceptance.result import AcceptanceResult
     from tui.session.acceptance.step_file import AcceptanceFile
     from tui.session.connect.open_line import OpenLine
@@ -175,11 +176,11 @@ def _login_name() -> str:
     return "unknown"
 
 
-def plan_lines(test: AcceptanceFile) -> list[str]:
+def plan_lines(test: AcceptanceFile, high: HighSpeed | None = None) -> list[str]:
     """Return the steps that move the motor or trip the drive, and the longest time of the runs."""
     from tui.session.acceptance.plan import REST_LINES, longest_motion, planned_motions
 
-    motions = planned_motions(test)
+    motions = planned_motions(test, high)
     if not motions:
         return [f"{test.test.name}: {len(test.steps)} steps. None moves the motor."]
     longest = longest_motion(test)
@@ -226,7 +227,7 @@ class AcceptSession:
                         self._ask_turned,
                         self.by,
                     )
-                    result = await run.carry_out(lambda: self._confirm(console, ending))
+                    result = await run.carry_out(lambda high: self._confirm(console, ending, high))
             finally:
                 if voice:
                     voice.finish()
@@ -244,7 +245,7 @@ class AcceptSession:
             return BY_SIGNAL + ending.number
         return ENDED_AFTER_WRITING if result.ended_by else DIFFERENT
 
-    async def _confirm(self, console: DriveConsole, ending: Ending) -> None:
+    async def _confirm(self, console: DriveConsole, ending: Ending, high: HighSpeed | None) -> None:
         """Show what will move; arm after a yes. Raises Failure, with nothing written."""
         from tui.drive.chart import ENABLED_KINDS
         from tui.session.running.watching import latest_of
@@ -253,7 +254,7 @@ class AcceptSession:
         from ..running.keyboard import ended_by_typing
 
         _may_arm(console)
-        for text in plan_lines(self.test):
+        for text in plan_lines(self.test, high):
             say(text, err=True)
         if not await says_yes(f"Carry out this test on device {console.device}?"):
             raise Failure("Not confirmed. Nothing was tested.", REFUSED_HERE)

@@ -21,6 +21,7 @@ from ..read.upload import Upload, setting_codes
 from ..running.ending import Ending
 from ..running.errors import MotorStopped, MotorTripped, NotStopped
 from .carry_out import carry_out_step
+from .high_speed import HighSpeed, read_high_speed
 from .motion import TEST_PERIOD, AcceptanceEnded, MotionBench
 from .result import AcceptanceResult, StepResult, settings_hash
 from .step_file import MEASURED, AcceptanceFile
@@ -77,11 +78,13 @@ class AcceptanceRun:
             identity={key: text for key, text in texts.items() if text},
         )
 
-    async def carry_out(self, confirm: Callable[[], Coroutine[Any, Any, None]]) -> AcceptanceResult:
+    async def carry_out(
+        self, confirm: Callable[[HighSpeed | None], Coroutine[Any, Any, None]]
+    ) -> AcceptanceResult:
         """Read the settings, have the motions confirmed, and carry out every step.
 
-        `confirm` raises if the person does not agree; then nothing was written. Raises the errors
-        of the first read-out.
+        `confirm` gets the high speed of the drive, and raises if the person does not agree; then
+        nothing was written. Raises the errors of the first read-out.
         """
         loop = asyncio.get_running_loop()
         bench = MotionBench(self.fleet, self.console, self.ending, self.say, self.warn)
@@ -98,9 +101,10 @@ class AcceptanceRun:
             self.result.settings_hash = settings_hash(self._before)
             self.result.settings_read = len(self._before.raws)
             self.result.unreadable = len(self._before.absent)
-            await bench.unless_ended(confirm())
+            high = await bench.unless_ended(read_high_speed(self.console))
+            await bench.unless_ended(confirm(high))
             self._watch()
-            await self._steps(bench, self._before)
+            await self._steps(StepWork(bench, self.file, self._before, self.ask_turned, high))
         except AcceptanceEnded as error:
             self.result.ended_by = str(error).rstrip(".")
         finally:
@@ -121,8 +125,8 @@ class AcceptanceRun:
         await upload.run()
         return upload.parameter_set()
 
-    async def _steps(self, bench: MotionBench, before: ParameterSet) -> None:
-        work = StepWork(bench, self.file, before, self.ask_turned)
+    async def _steps(self, work: StepWork) -> None:
+        bench = work.bench
         for step in self.result.steps:
             step.text = NOT_REACHED
         for step in self.result.steps:

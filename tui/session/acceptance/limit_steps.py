@@ -2,21 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 from tui.bus.errors import DeviceException
 from tui.drive.values import NOT_AVAILABLE
 
 from ..command.access import CommandAccess
 from ..command.motor_start import write_reference
-from ..command.reference import convert_reference, reference_codes, reference_limits
+from ..command.reference import convert_reference, reference_codes
 from ..proof.prover import NothingToProve, Prover
 from ..proof.result import ProofResult, proof_entry
 from ..running.errors import MotorStopped
 from ..running.watching import latest_of, outcome_or_error
 from ..settings.write import NotTaken
 from ..work import Permit, Task
+from .high_speed import read_high_speed
 from .motion import StepFailed
 from .result import StepResult
 from .step_work import SETTLED_HERTZ, StepWork
@@ -28,14 +26,13 @@ from .steps import (
 
 async def run_limit(work: StepWork, step: LimitStep, result: StepResult) -> None:
     """Give a reference above the high speed; the output frequency must stay at the high speed."""
-    bench, profile = work.bench, work.file.profile
-    parameter = profile.quantity("command_frequency")
-    assert parameter is not None, "checked with the file"
-    readings = await bench.unless_ended(_reference_words(work))
-    _, high, code = reference_limits(profile, readings, parameter)
-    if high is None:
+    bench = work.bench
+    found = await bench.unless_ended(read_high_speed(bench.console))
+    if found is None:
         raise StepFailed("The high speed of the drive cannot be read.")
-    most = float(high)
+    if found != work.high_speed:
+        raise StepFailed(f"{found.code} is now {found.hertz:g} Hz: another one was confirmed.")
+    most, code = found
     over = f"{most + step.over:g}Hz"
     allowed = most + min(step.tolerance, step.over / 2)
     highest = 0.0
@@ -74,10 +71,6 @@ async def _restore_reference(work: StepWork, hz: float) -> None:
         await work.bench.unless_ended(work.bench.refer(hz))
     finally:
         work.bench.disarm()
-
-
-async def _reference_words(work: StepWork) -> Mapping[str, Any]:
-    return await work.bench.console.read(reference_codes(work.file.profile))
 
 
 async def _reference_above(work: StepWork, text: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .high_speed import HighSpeed
 from .step_file import AcceptanceFile
 from .steps import (
     AcceptanceStep,
@@ -21,22 +22,26 @@ COARSE_RAMP = 60.0
 """Seconds within which a motor must reach a speed whose ramp is not given."""
 PROOF_FACTOR, PROOF_MORE = 12.0, 20.0
 """Longest test of a communication loss: so many timeouts, and seconds more."""
+COASTING_STOP = "freewheel"
 REST_LINES = (
     "Each run ends with a stop. Ctrl-C or Enter stops the motor at once and ends the test.",
     "Check the machine, the people near it, and its emergency stop.",
 )
 
 
-def planned_motions(file: AcceptanceFile) -> list[str]:
-    """Return a line for each step that runs the motor or trips the drive, in their order."""
+def planned_motions(file: AcceptanceFile, high: HighSpeed | None = None) -> list[str]:
+    """Return a line for each step that runs the motor or trips the drive, in their order.
+
+    `high` is the high speed of the drive, once it was read.
+    """
     return [
         f"Step {number}: {text}"
         for number, step in enumerate(file.steps, start=1)
-        if (text := step_effect(step))
+        if (text := step_effect(step, high))
     ]
 
 
-def step_effect(step: AcceptanceStep) -> str:
+def step_effect(step: AcceptanceStep, high: HighSpeed | None = None) -> str:
     """Describe the effect of a step on the motor and the drive; empty for none."""
     if isinstance(step, CommunicationLossStep) and not step.turning:
         return f"motor at standstill; polling pauses until the drive trips ({step.timeout:g} s)."
@@ -54,10 +59,16 @@ def step_effect(step: AcceptanceStep) -> str:
         each = f"{step.seconds:g} s each, {step.settle:g} s at most to reach it"
         return f"{run.replace(' at ', f' at {speeds} % of ')}; {each}."
     if isinstance(step, StopStep):
-        return f"{run}, for {step.seconds:g} s, then {step.method}, within {step.max:g} s."
-    if isinstance(step, LimitStep):
+        text = f"{run}, for {step.seconds:g} s, then {step.method}, within {step.max:g} s."
         return (
-            f"{step.direction} at the high speed of the drive, then with a reference {step.over:g}"
+            f"{text} The motor COASTS, and a hoist load falls."
+            if step.method == COASTING_STOP
+            else text
+        )
+    if isinstance(step, LimitStep):
+        speed = f"{high.code} = {high.hertz:g} Hz" if high else "the high speed of the drive"
+        return (
+            f"{step.direction} at {speed}, then with a reference {step.over:g}"
             f" Hz ABOVE it, for {step.seconds:g} s. A drive that ignores its limit exceeds it."
         )
     assert isinstance(step, CommunicationLossStep)

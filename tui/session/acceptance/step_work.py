@@ -9,6 +9,7 @@ from typing import Any
 from tui.drive.settings.parameter_set import ParameterSet
 
 from ..running.watching import latest_of
+from .high_speed import HighSpeed
 from .motion import Motion, MotionBench, StepFailed
 from .plan import longest_of
 from .result import StepResult
@@ -32,6 +33,8 @@ class StepWork:
     before: ParameterSet
     """Settings of the drive before the test."""
     ask_turned: AskTurned
+    high_speed: HighSpeed | None = None
+    """The high speed that the person has confirmed."""
 
     async def run(
         self, hz: float | None, steps: Callable[[], Awaitable[None]], result: StepResult
