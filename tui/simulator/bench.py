@@ -46,6 +46,8 @@ class _Line(NamedTuple):
     deeds: tuple[tuple[Deed, ...], ...]
     """Changes by drive."""
     inputs: bool
+    later: str
+    """The line without its time."""
 
 
 class Bench:
@@ -82,7 +84,7 @@ class Bench:
         """
         line = self._parse(text)
         if line.delay is not None:
-            self._wait_for(line.delay, text)
+            self._wait_for(line.delay, line.later)
             return []
         return self._carry_out(line)
 
@@ -110,11 +112,9 @@ class Bench:
     # Lines that wait for their time
 
     def _wait_for(self, delay: float, text: str) -> None:
-        rest = _TIMED.fullmatch(text)
-        assert rest is not None
         with self._changed:
             due = time.monotonic() + delay
-            heapq.heappush(self._due, (due, next(self._numbers), rest[3]))
+            heapq.heappush(self._due, (due, next(self._numbers), text))
             if self._thread is None:
                 self._thread = threading.Thread(target=self._work, name="bench", daemon=True)
                 self._thread.start()
@@ -139,15 +139,20 @@ class Bench:
     # Parsing
 
     def _parse(self, text: str) -> _Line:
-        delay = None
-        if (timed := _TIMED.fullmatch(text)) is not None:
-            delay, rest = self._delay(timed[1].casefold(), float(timed[2]), text), timed[3]
-        else:
-            rest = text
-        drives, rest = self._drives(rest)
+        delay, plain = self._delayed(text)
+        drives, rest = self._drives(plain)
+        if delay is None:  # the time may follow the address, too
+            delay, rest = self._delayed(rest)
+            plain = f"{plain.partition(':')[0]}:{rest}" if delay is not None else plain
         parts = [part.strip() for part in rest.split(",") if part.strip()]
         deeds = tuple(tuple(prepared(drive, part) for part in parts) for drive in drives)
-        return _Line(delay, drives, deeds, all("=" in part for part in parts))
+        return _Line(delay, drives, deeds, all("=" in part for part in parts), plain)
+
+    def _delayed(self, text: str) -> tuple[float | None, str]:
+        """Return the time in s until a line is due, and the rest of it; None if it names none."""
+        if (timed := _TIMED.fullmatch(text)) is None:
+            return None, text
+        return self._delay(timed[1].casefold(), float(timed[2]), text), timed[3]
 
     def _delay(self, word: str, seconds: float, text: str) -> float:
         if seconds > LATEST:

@@ -26,6 +26,7 @@ HAND_BACK = (
 )
 GIVE_BY = "Set the reference by a learned preset, or end that. Asks first."
 TAKE_OVER = "Take over a motor whose program has ended; sends nothing. Needs arming."
+REHEARSE = "Rehearse on a simulated drive: trip, power, wire, mains, load, inertia, jam, key."
 INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V."
 
 COMMAND_ACTIONS = (
@@ -106,6 +107,7 @@ REGISTERED = (
                 ),
                 ("move_cursor(1)", "right", "", "Move the cursor forward in time."),
                 ("leave", "escape", "", "Close the cursor; else go back to Line."),
+                ("rehearse", "", "", REHEARSE),
                 ("change_rate(1)", "", "", "Poll twice as often."),
                 ("change_rate(-1)", "", "", "Poll half as often."),
                 ("rating", "", "", "Enter the rated current, if the drive gives its current in %."),

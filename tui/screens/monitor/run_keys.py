@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from decimal import Decimal
+from typing import TYPE_CHECKING
 
 from rich.style import Style
 from rich.text import Text
@@ -23,6 +24,9 @@ from ..command.command_keys import OrderKeys
 from ..command.control import hindrance
 from ..keys.table import ACTIONS
 from .run_line import STEPS, Purpose, RunLine, limits, proposed, run_lines
+
+if TYPE_CHECKING:
+    from tui.simulator import Bench
 
 OTHER_STOP_KEYS = frozenset(item.keys for item in ACTIONS if item.id.startswith("stop_as("))
 """Keys of other stops, such as quick stop; they act immediately."""
@@ -208,24 +212,58 @@ def _steps(event: Key) -> bool:
 
 
 NOT_SIMULATED = "Inputs are set at the terminals. Only a simulated drive's inputs can be set here."
+NOT_REHEARSED = "Only simulated drives can be changed here. Open some with drivepanel demo."
 LOOKS_LIKE = "LI1=1,AI1=5V: logic inputs 1 or 0, analog 5V, 12mA, 50%."
 
 
+REHEARSAL = """\
+trip OCF · power off, on · wire cut, join · mains 180V · load 120%
+inertia 3 · jam · key STOP · clear: undo all · state: show all
+in 5s: trip OCF waits for 5 s. No machine moves: it is simulated."""
+"""Commands of the bench that a person rehearses with, below the field for them."""
+
+
 class InputKeys(RunKeys):
-    """Key that sets the inputs of a simulated drive."""
+    """Actions that change a simulated drive; they are refused on a real line."""
 
     def action_inputs(self) -> None:
-        """Prompt for the inputs of a simulated drive and set them; refuse on a real line."""
-        simulation = self.app.opened.simulation if self.app.opened else None
-        if simulation is None:
-            self.app.notify(NOT_SIMULATED, severity="warning")
-            return
-        from tui.simulator import Bench, SimulatorError
+        """Prompt for the inputs of a simulated drive and set them."""
+        device = self.session.device
+        if (bench := self._bench(NOT_SIMULATED)) is not None and (
+            opened := self.app.opened
+        ) is not None:
+            assert opened.simulation is not None
+            about = f"{opened.simulation.drive(device).terminals.reported()}\n{LOOKS_LIKE}"
+            question = f"Inputs of the simulated drive {device}"
+            self._change(bench, question, about, subject="Simulated inputs", number=True)
+
+    def action_rehearse(self) -> None:
+        """Prompt for a trip, a loss of supply or another event of a simulated drive."""
+        if (bench := self._bench(NOT_REHEARSED)) is not None:
+            question = f"Rehearse on the simulated drive {self.session.device}"
+            self._change(bench, question, REHEARSAL, subject="Simulated drive", number=False)
+
+    def _bench(self, refusal: str) -> Bench | None:
+        """Return the bench of a simulated line; None, and a message, on a real one."""
+        opened = self.app.opened
+        if opened is None or opened.simulation is None:
+            self.app.notify(refusal, severity="warning")
+            return None
+        if opened.bench is None:
+            from tui.simulator import Bench
+
+            opened.bench = Bench(opened.simulation)
+        return opened.bench
+
+    def _change(
+        self, bench: Bench, question: str, about: str, *, subject: str, number: bool
+    ) -> None:
+        """Ask for a line of the bench, and carry it out on the drive of this screen."""
+        from tui.simulator import SimulatorError
 
         from ..dialogs.ask import Ask
 
         device = self.session.device
-        bench = Bench(simulation)
 
         def fault(text: str) -> str:
             try:
@@ -235,11 +273,14 @@ class InputKeys(RunKeys):
             return ""
 
         def reported(text: str | None) -> None:
-            if text is not None:
-                for result in bench.do(f"{device}: {text}"):
-                    self.app.notify(f"Simulated inputs, {result.device}: {result.text}")
+            if text is None:
+                return
+            results = bench.do(f"{device}: {text}")
+            for result in results:
+                self.app.notify(f"{subject}, {result.device}: {result.text}")
+            if not results:
+                self.app.notify(f"{subject}, {device}: waits for its time.")
 
-        question = f"Inputs of the simulated drive {device}"
-        about = f"{simulation.drive(device).terminals.reported()}\n{LOOKS_LIKE}"
-        requested = Ask(question, fault, about=about, takes="Set", number=True)
-        self.app.push_screen(requested, reported)
+        self.app.push_screen(
+            Ask(question, fault, about=about, takes="Set", number=number), reported
+        )

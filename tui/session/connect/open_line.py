@@ -20,7 +20,7 @@ from .line_key import REPLAY_PREFIX, SIMULATED_PREFIX, is_replay, line_key
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
     from tui.bus.link import Link, SerialLink, UsualSettings
-    from tui.simulator import DriveSpec, Simulation
+    from tui.simulator import Bench, DriveSpec, Simulation
 
     from ..record.recorder import LineRecorder
     from ..record.replay_line import ReplayLine
@@ -53,6 +53,8 @@ class OpenLine:
     """Opens the line again at other settings, for this program alone."""
     farewells: dict[int, Farewell] = field(default_factory=dict)
     """By address, the report on each drive before the line is closed."""
+    bench: Bench | None = None
+    """Carries out lines on the simulated drives; None for other lines."""
     recorder: LineRecorder | None = None
     """Records what this process itself sends on the line; None if it does not."""
     private: TemporaryDirectory[str] | None = None
@@ -82,6 +84,8 @@ class OpenLine:
         self.line.close()
         if self.recorder is not None:
             self.recorder.close()
+        if self.bench is not None:
+            self.bench.close()
         if self.simulation is not None:
             self.simulation.stop()
         if self.private is not None:
