@@ -38,6 +38,7 @@ def tcp_line(*arguments: str) -> Iterator[str]:
             "control",
             "sources",
             "once",
+            "about",
             "as_json",
         )
         options = {name: given for name, given in context.params.items() if name not in places}

@@ -98,6 +98,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
     "what others say": (0, ("listen", "sim:atv71@2", "--for", "0.5"),
                         {"HeardExchangeDocument", "HeardSummaryDocument"}),
     "a list of statuses": (0, ("status", "sim:atv71@1,atv312@2", "--all"), {"StatusDocument"}),
+    "how it is simulated": (0, ("simulate", "--about", "atv21"), {"SimulatedBehaviorDocument"}),
     "no such code": (2, ("read", *DRIVE, "NOSUCH"), {"ErrorDocument"}),
 }  # fmt: skip
 """By name: exit status, words, and the forms of the documents. FOLDER is that of the fixture."""

@@ -90,6 +90,12 @@ USUAL = (19200, "8E1")
     help="Run the motors at this frequency from the start.",
 )
 @click.option(
+    "--about",
+    metavar="PROFILE",
+    help="List the simulated behavior with its sources, then end.",
+    shell_complete=complete_profile,
+)
+@click.option(
     "--from",
     "sources",
     multiple=True,
@@ -124,6 +130,7 @@ def simulate(
     faults: tuple[str, ...],
     seed: int,
     run_hz: float,
+    about: str | None,
     sources: tuple[str, ...],
     once: bool,
     script: str | None,
@@ -135,6 +142,11 @@ def simulate(
     Lines on standard input change a drive: "2: LI1=1, AI1=5V", "2: trip OCF", "all: power off",
     "in 3.5s: 2: jam". "2:" shows its inputs, "2: state" its real state.
     """
+    if about is not None:
+        from ..running.bench_about import show_about
+
+        show_about(about, as_json)
+        return
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
         raise click.UsageError("Say where: one of --pty, --serial, --tcp, --rtu-tcp.")
     if not drives and not sources:

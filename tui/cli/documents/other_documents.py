@@ -218,6 +218,22 @@ class SimulatedDriveField(DocumentPart):
     device: int
 
 
+class BehaviorField(DocumentPart):
+    """One behavior of a simulated drive, and where it is from."""
+
+    text: str
+    provenance: Literal["printed", "public", "guess"]
+    source: str
+
+
+class SimulatedBehaviorDocument(Document, kw_only=True):
+    """`simulate --about`: the behavior of the simulated drives of a profile."""
+
+    command: Literal["simulate"] = "simulate"
+    profile: str
+    behaviors: list[BehaviorField]
+
+
 class GhostField(DocumentPart):
     """A drive played from a record, whose first exchange was at `begun`."""
 
