@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from textual.widgets import Input, OptionList
 
+from tests.session.test_report_trends import written_run
 from tests.sweeps import kept
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
@@ -355,6 +358,24 @@ async def test_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         assert made.app.place == "parameters"
         await message(made, "parameters", "pump.md")
         assert "Altivar 312" in read(Path("pump.md"))
+        assert "Last run" not in read(Path("pump.md"))
+
+
+async def test_report_has_the_trend_of_the_last_run_beside_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("tui.session.report_trends.RUN_SOUGHT_FOR", time.time())
+    files = written_run(tmp_path / "record", profile="atv312")
+    async with bench("atv312") as made:
+        assert made.app.opened is not None
+        made.app.opened.recorder = SimpleNamespace(files=lambda: files, close=bool)  # type: ignore[assignment]
+        await answer(made, "ctrl+r", "pump.md")
+        await message(made, "parameters", "pump.md")
+        text = read(Path("pump.md"))
+        assert "![Curve of the run](<pump-run.svg>)" in text
+        assert text.index("## Last run") < text.index("## Writes by Drive Panel")
+        assert "<polyline" in read(Path("pump-run.svg"))
 
 
 async def test_panel_follows_a_drive_to_its_new_address() -> None:

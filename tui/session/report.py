@@ -27,8 +27,13 @@ ENTRIES_SHOWN = 200
 CHANNEL_QUANTITIES: tuple[Quantity, ...] = ("command_channel", "reference_channel")
 
 
-def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]) -> str:
-    """Return the report as Markdown; `entries` are the drive's journal entries, oldest first."""
+def report_text(
+    profile: Profile, values: ParameterSet, entries: Sequence[Entry], trends: Sequence[str] = ()
+) -> str:
+    """Return the report as Markdown; `entries` are the drive's journal entries, oldest first.
+
+    `trends` are lines about its last trip and run.
+    """
     written = [entry for entry in entries if entry.kind == "write"]
     trips = [entry for entry in entries if entry.kind == "fault"]
     proofs = [entry for entry in entries if entry.kind == "proof"]
@@ -42,6 +47,7 @@ def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]
         maker.watch(),
         maker.faults(),
         maker.seen(),
+        *([trends] if trends else []),
         maker.journal(),
     )
     return plain("\n".join(line for part in parts for line in (*part, "")), lines=True)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..shared.errors import INTERRUPTED, Failure
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
@@ -17,6 +19,9 @@ from ..shared.sets import (
 )
 from ..shared.standard_streams import STANDARD
 
+if TYPE_CHECKING:
+    from tui.session.report_trends import ReportTrend
+
 
 @command("Write a report on a drive to a file.", group="Watch", statuses=ON_LINE)
 @line_argument
@@ -29,22 +34,34 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     """Write a report on a drive to FILE, as Markdown; `-` is standard output.
 
     It has identification, line settings, settings changed from the factory, control source,
-    scanner, reaction to a communication loss, faults, and writes by Drive Panel.
+    scanner, reaction to a communication loss, faults, and writes by Drive Panel. The trends of the
+    last trip and the last run are SVG files next to FILE; on standard output they are text.
     """
+    import time
+
+    from tui.session.connect.recorded_line import record_files
     from tui.session.journal import Journal
     from tui.session.journal_reading import entries_of
     from tui.session.report import report_text as text_of
+    from tui.session.report_trends import TREND_KINDS, report_trends, trend_file
 
     from ..documents.setting_documents import ReportDocument
     from ..shared.output import drive_fields, print_json
 
     refuse_output(file, force=force, as_json=as_json)
+    if file != STANDARD:
+        for kind in TREND_KINDS:
+            drawing = file.with_name(trend_file(file.stem, kind))
+            refuse_output(drawing, force=force, as_json=as_json)
     try:
         session, values = set_of_drive(target)
     except KeyboardInterrupt:
         raise Failure("Ended by Ctrl-C: nothing was written.", INTERRUPTED) from None
     entries = entries_of(Journal(), session.line_text, target.device)
-    write_down(file, text_of(session.profile, values, entries), force=force)
+    record = record_files(target.line_text)
+    trends = report_trends(record, target.device, session.profile, entries, time.time())
+    lines = _written_trends(trends, file, force=force)
+    write_down(file, text_of(session.profile, values, entries, lines), force=force)
     messages = Messages(as_json=as_json or file == STANDARD)
     messages.tell(f"{file}: report on {session.profile.name} at address {target.device}")
     if as_json:
@@ -57,3 +74,17 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
                 messages=messages.texts,
             )
         )
+
+
+def _written_trends(trends: Sequence[ReportTrend], file: Path, *, force: bool) -> list[str]:
+    """Write the curves beside the report; return its part about them. Raises Failure."""
+    from tui.session.report_trends import linked, trend_files, trend_lines
+
+    from ..shared.curve_text import curve_text
+
+    if file == STANDARD:
+        return trend_lines(trends, {trend.kind: curve_text(trend) for trend in trends})
+    drawn = trend_files(trends, file.stem)
+    for name, svg in drawn.values():
+        write_down(file.with_name(name), svg, force=force)
+    return trend_lines(trends, linked(drawn))

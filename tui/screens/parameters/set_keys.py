@@ -117,22 +117,33 @@ class SetKeys(ParameterKeys):
             "Back up to",
             "toml",
             about,
-            lambda values: dump_set(profile, values),
+            lambda values, _: dump_set(profile, values),
             setting_codes(profile),
         )
 
     def action_report(self) -> None:
         """Ask for a file, read everything, and write a report for a customer."""
+        from tui.drive.settings.set_file import write_file
         from tui.session.journal_reading import entries_of
         from tui.session.report import report_text
+        from tui.session.report_trends import linked, report_trends, trend_files, trend_lines
 
-        def text(values: ParameterSet) -> str:
-            entries = entries_of(self.editor.journal, self.session.line_text, self.session.device)
-            return report_text(self.session.profile, values, entries)
+        profile, device = self.session.profile, self.session.device
+        recorder = self.app.opened.recorder if self.app.opened is not None else None
+        now = self.app.clock.wall()
+
+        def text(values: ParameterSet, path: Path) -> str:
+            entries = entries_of(self.editor.journal, self.session.line_text, device)
+            files = recorder.files() if recorder is not None else []
+            trends = report_trends(files, device, profile, entries, now)
+            drawn = trend_files(trends, path.stem)
+            for name, svg in drawn.values():
+                write_file(path.with_name(name), svg)
+            return report_text(profile, values, entries, trend_lines(trends, linked(drawn)))
 
         about = (
-            "Identity, line, changed settings, control source, communication loss reaction, faults"
-            " and writes by Drive Panel (Markdown)."
+            "Identity, line, changed settings, control source, communication loss reaction, faults,"
+            " last trip and run (as SVG files), writes by Drive Panel (Markdown)."
         )
         self._ask_for_file("Report to", "md", about, text, [])
 
@@ -141,7 +152,7 @@ class SetKeys(ParameterKeys):
         question: str,
         suffix: str,
         about: str,
-        text: Callable[[ParameterSet], str],
+        text: Callable[[ParameterSet, Path], str],
         codes: list[str],
     ) -> None:
         """Ask for a file, read these codes (all if empty), and write the text to it."""
@@ -160,7 +171,7 @@ class SetKeys(ParameterKeys):
         self.app.push_screen(requested, reported)
 
     async def _read_to_file(
-        self, path: Path, text: Callable[[ParameterSet], str], codes: list[str]
+        self, path: Path, text: Callable[[ParameterSet, Path], str], codes: list[str]
     ) -> None:
         from tui.drive.settings.set_file import write_file
         from tui.session.read.upload import Upload
@@ -173,7 +184,7 @@ class SetKeys(ParameterKeys):
             await upload.run()
             values = upload.parameter_set()
             # the disk may hang
-            await asyncio.to_thread(lambda: write_file(path, text(values)))
+            await asyncio.to_thread(lambda: write_file(path, text(values, path)))
         except (LineError, DriveError) as error:
             self._refuse(f"Not saved: {error}")
         else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -95,8 +96,11 @@ _STEPS = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)
 HERTZ_COLOR, AMPERE_COLOR = "#1f5fa8", "#a85f1f"
 
 
-def curve_svg(curve: RunCurve, title: str) -> str:
-    """Return a run as SVG: frequency, current, and marks."""
+def curve_svg(curve: RunCurve, title: str, reach: float = math.inf) -> str:
+    """Return a run as SVG: frequency, current, and marks.
+
+    Values that are more than `reach` seconds apart are not connected.
+    """
     points = tuple(curve.points)
     start = points[0].time if points else 0.0
     length = max(points[-1].time - start if points else 0.0, 1.0)
@@ -139,18 +143,26 @@ def curve_svg(curve: RunCurve, title: str) -> str:
             for v in _ticks(0, most_amps)
         ]
         parts.append(_text(right + 6, TOP - 6, "A", color=AMPERE_COLOR))
-        shown = [
-            (across(p.time), up(abs(p.amperes) / most_amps))
-            for p in points
-            if p.amperes is not None
-        ]
-        parts.append(_path(shown, AMPERE_COLOR))
-    parts.append(_path([(across(p.time), hertz_at(p.hertz)) for p in points], HERTZ_COLOR))
+        for stretch in _stretches([p for p in points if p.amperes is not None], reach):
+            shown = [(across(p.time), up(abs(p.amperes or 0.0) / most_amps)) for p in stretch]
+            parts.append(_path(shown, AMPERE_COLOR))
+    for stretch in _stretches(points, reach):
+        shown = [(across(p.time), hertz_at(p.hertz)) for p in stretch]
+        parts.append(_path(shown, HERTZ_COLOR))
     for time, text in curve.marks:
         if start <= time <= start + length:
             parts.append(_line(across(time), TOP, across(time), HEIGHT - BOTTOM, "#888888"))
             parts.append(_text(across(time) + 3, TOP + 12, text, color="#555555"))
     return "\n".join([*parts, "</svg>", ""])
+
+
+def _stretches(points: Sequence[RunPoint], reach: float) -> Iterator[Sequence[RunPoint]]:
+    """Yield the points between gaps."""
+    begin = 0
+    for at in range(1, len(points) + 1):
+        if at == len(points) or points[at].time - points[at - 1].time > reach:
+            yield points[begin:at]
+            begin = at
 
 
 def _ticks(low: float, high: float) -> Iterator[float]:
