@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
+import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -12,7 +14,15 @@ from pathlib import Path
 
 import pytest
 
-from tests.programs import drivepanel, end_keepers, simulated, wait_until
+from tests.programs import (
+    DRIVEPANEL,
+    drivepanel,
+    end_keepers,
+    port_of,
+    served,
+    simulated,
+    wait_until,
+)
 
 from .terminal import A_MOMENT, Terminal
 
@@ -74,4 +84,36 @@ def test_ghost_shows_what_the_drive_showed(
         assert outputs(line) == first
         again = monitor(second_terminal, line)
         wait_until(lambda: texts(again) == shown, f"{shown} on the ghost")
+    end_keepers()
+
+
+def change_of_fault(line: str, provoke: Callable[[], object]) -> tuple[int, int]:
+    """Raw values of the last fault at first and after a change, which `provoke` may cause."""
+    options = ("-d", "2", "-p", "atv71", "--every", "0.3", "--json")
+    with served([*DRIVEPANEL, "watch", line, *options, "LFT"], ready='"values"') as watch:
+        before = last_fault(watch.ready)
+        provoke()
+        assert watch.process.stdout is not None
+        found = (last_fault(row) for row in watch.process.stdout)
+        return before, next(raw for raw in found if raw != before)
+
+
+def last_fault(row: str) -> int:
+    return int(json.loads(row)["values"]["LFT"]["raw"])
+
+
+def test_trip_of_a_ghost_comes_after_its_start(tmp_path: Path) -> None:
+    link = str(tmp_path / "line")
+    line = f"serial:{link}"
+    with simulated("atv71@2", "--run", "30", "--pty", link, stdin=subprocess.PIPE) as drive:
+        typed = drive.process.stdin
+        assert typed is not None
+        recorded_change = change_of_fault(
+            line, lambda: print("2: trip OCF", file=typed, flush=True)
+        )
+    end_keepers()
+    (record,) = Path(os.environ["DRIVEPANEL_STATE"], "record").glob("*.sqlite")
+    with simulated("--from", f"{record}@2", "--tcp", "127.0.0.1:0") as ghost:
+        place = f"tcp:127.0.0.1:{port_of(ghost.ready)}"
+        assert change_of_fault(place, lambda: None) == recorded_change
     end_keepers()

@@ -154,6 +154,8 @@ class BenchSocket:
         if not hasattr(socket, "AF_UNIX"):
             raise click.UsageError("This system has no sockets with a path. Use standard input.")
         if self._path.is_socket():
+            if _is_served(path):
+                raise click.UsageError(f"{path} is in use by another program.")
             self._path.unlink()  # left by a program that was killed
         self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
@@ -186,3 +188,13 @@ class BenchSocket:
                 if line := data.decode("utf-8", "replace").strip():
                     answer = "\n".join(answers_to(self._bench, line))
                     client.sendall(f"{answer}\n".encode())
+
+
+def _is_served(path: str) -> bool:
+    """Return True if a program accepts connections at a socket."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(path)
+        except OSError:
+            return False
+        return True
