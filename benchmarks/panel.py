@@ -86,6 +86,7 @@ SCREENS = {
     "5": "Faults",
     "6": "Control",
     "7": "Frames",
+    "8": "Trend",
     "m": "Messages",
 }
 WORD = Key("\t", word_sign)

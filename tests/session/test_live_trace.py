@@ -82,6 +82,22 @@ async def test_failed_cycle_is_a_gap_and_no_value_is_repeated(bench: Bench) -> N
     trace.close()
 
 
+async def test_values_of_a_later_time_are_dropped_if_the_clock_is_set_back(bench: Bench) -> None:
+    trace = LiveTrace(bench.monitor, [FAST], 0.01)
+    await until(lambda: len(trace.points(FAST, 0)) > 3)
+    before = trace.points(FAST, 0)[0].time
+    clock = bench.monitor.session.clock
+    wall = clock.wall
+    clock.wall = lambda: wall() - 3600  # type: ignore[method-assign]
+    try:
+        await until(lambda: trace.points(FAST, 0)[0].time < before - 3000)
+        times = [point.time for point in trace.points(FAST, 0)]
+    finally:
+        clock.wall = wall  # type: ignore[method-assign]
+        trace.close()
+    assert times == sorted(times)
+
+
 def test_rates_with_a_slow_code_read_it_fast_only() -> None:
     rates = Rates(("A",), ("B",), ("C", "D")).with_fast(["C", "A", "E"])
     assert (rates.fast, rates.changing, rates.slow) == (("A", "C", "E"), ("B",), ("D",))

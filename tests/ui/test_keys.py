@@ -360,7 +360,7 @@ async def back_to(made: Bench, screen: str) -> None:
 
 REPLAY_KEYS = {*"0;{}$#@", "comma"}
 SHOW_EVERYWHERE = {
-    *"1234567", *"&é\"'(è", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l", *REPLAY_KEYS
+    *"12345678", *"&é\"'(è_", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l", *REPLAY_KEYS
 }  # fmt: skip
 ARROWS = {"up", "down", "pageup", "pagedown"}
 SHOW = {
@@ -376,6 +376,7 @@ SHOW = {
     "map": {"left", "right", "tab", "pageup", "pagedown"},
     "frames": {*ARROWS, "tab"},
     "listening": {*ARROWS, "tab"},
+    "trend": {*ARROWS, "left", "right", "<", ">", "M", "tab", "home", "end"},
     "messages": ARROWS,
     "wiring": {*ARROWS, "tab", "shift+tab"},
 }  # fmt: skip

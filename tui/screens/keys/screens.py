@@ -15,6 +15,7 @@ PACKAGES = (
     "faults",
     "control",
     "frames",
+    "trend",
     "messages",
     "wiring",
 )

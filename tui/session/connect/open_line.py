@@ -91,6 +91,12 @@ class OpenLine:
         if self.private is not None:
             self.private.cleanup()
 
+    def recorded_files(self) -> list[Path]:
+        """Return the files of the line's record, or the one that is replayed. Raises OSError."""
+        if self.replay is not None:
+            return [self.replay.path]
+        return self.recorder.files() if self.recorder is not None else []
+
     def record_privately(self) -> None:
         """Record a simulated line until it is closed, outside the state folder."""
         from .recorded_line import may_record, record_privately

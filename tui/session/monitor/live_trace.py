@@ -12,6 +12,8 @@ from ..shown import Shown
 from .monitor import Monitor
 from .snapshot import Snapshot
 
+SET_BACK = 1.0
+"""Seconds by which the time must go back to be another time."""
 MOST_TRACED = 40_000
 """Points of one parameter: an hour of ten a second."""
 
@@ -51,6 +53,8 @@ class LiveTrace:
                 if reading is None:
                     continue
                 at = self._session.clock.wall_of(reading.time)
+                if points and snapshot.wall < points[-1].time - SET_BACK:
+                    points.clear()  # the clock was set back, or a replay
                 if points and at <= points[-1].time:
                     if not snapshot.error:
                         continue

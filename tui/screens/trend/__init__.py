@@ -1,0 +1,1 @@
+"""Trend: values of up to four parameters over time."""
