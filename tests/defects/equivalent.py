@@ -25,5 +25,16 @@ EQUIVALENT: dict[str, str] = {
     "tui/drive/read_plan.py:run_length: constant: 0 -> 1": (
         "A run of one parameter has returned by then, and all of a run have the same function."
     ),
+    "tui/drive/read_plan.py:_cheapest: boundary: last - ordered[start].address >= longest ->"
+    " (last - ordered[start].address > longest)": (
+        "The read that is looked at in addition is too long, and `run_length` refuses it."
+    ),
+    "tui/drive/read_plan.py:_cheapest: constant: 0 -> 1": (
+        "The first entry is of no parameters: where its last run begins is not read."
+    ),
+    "tui/bus/rtu/exchange.py:RtuExchange._is_too_short: condition: not self._exceptions or refusal"
+    " not in self.buffer -> ((not self._exceptions) and (refusal not in self.buffer))": (
+        "It saves time only: a search of too few bytes finds no reply."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

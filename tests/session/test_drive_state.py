@@ -159,3 +159,19 @@ def test_frequency_without_a_sign_gets_that_of_the_direction(
     words = SimpleNamespace(type=kind)
     state = SimpleNamespace(direction=direction)
     assert with_direction(cast(Any, words), 30.0, cast(Any, state)) == number
+
+
+@pytest.mark.parametrize(
+    ("charts", "mode", "active"),
+    [
+        ([IO_CHART, CHART], 3, "io"), ([IO_CHART, CHART], 1, "drivecom"),
+        ([IO_CHART, CHART], None, "drivecom"), ([IO_CHART], None, "io"), ([IO_CHART], 1, "io"),
+        ([], None, None),
+    ],
+)  # fmt: skip
+def test_active_chart_is_the_one_whose_condition_holds_else_the_one_without(
+    charts: list[dict[str, object]], mode: int | None, active: str | None
+) -> None:
+    profile = profile_of(parameter("ETA", 3201), parameter("CHCF", 8401), charts=charts)
+    found = profile.chart({} if mode is None else {"CHCF": mode})
+    assert (found.id if found else None) == active

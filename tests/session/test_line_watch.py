@@ -510,3 +510,71 @@ async def test_drive_is_kept_alive_by_what_was_learned_of_it(
     here.done.clear()
     await here.watch._learn(kept)
     assert here.done == [], "another session of the drive is kept now"
+
+
+@pytest.mark.parametrize(
+    ("running", "learned", "error", "begun", "pause", "timeout"),
+    [
+        (True, 90.0, None, True, 0.3, None), (False, 90.0, None, True, 3.0, 10.0),
+        (False, None, None, True, 0.3, 10.0), (False, 90.0, None, False, 3.0, None),
+        (False, 90.0, NoAnswer(1, 3, 1), True, 3.0, 10.0),
+    ],
+)  # fmt: skip
+async def test_check_of_a_drive_has_its_state_or_its_error(
+    running: bool, learned: float | None, error: Exception | None, begun: bool, pause: float,
+    timeout: float | None, monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    here = Watched(monkeypatch)
+    kept = here.keep()
+    here.begun, kept.watch, kept.learned, kept.monitor.running = begun, TRIPS, learned, running
+    state = SimpleNamespace(motion="stopped", local=False)
+    reads: list[object] = []
+    noted: list[object] = []
+
+    async def read(codes: list[str], **how: object) -> dict[str, str]:
+        reads.append((codes, how))
+        if error is not None:
+            raise error
+        return {"RFR": "read"}
+
+    kept.reader = SimpleNamespace(read=read)
+    kept.monitor.add_to_trend = noted.append
+    channels = {"CHCF": SimpleNamespace(access="rw-stopped"), "CHAN": SimpleNamespace(access="r")}
+    kept.session.profile = channels
+    kept.session.image = SimpleNamespace(get=lambda code: "held" if code == "CHCF" else None)
+    monkeypatch.setattr(line_watches, "_state_codes", lambda _: ["ETA"])
+    monkeypatch.setattr(line_watches, "_glance_codes", lambda _: ["RFR"])
+    monkeypatch.setattr(line_watches, "unread_limit", lambda _: ["NCR"])
+    monkeypatch.setattr(line_watches, "channel_codes", lambda _: ["CHCF", "CHAN"])
+    used: list[object] = []
+
+    def state_of(profile: object, readings: object) -> Any:
+        used.append(readings)
+        return state
+
+    monkeypatch.setattr(line_watches, "drive_state", state_of)
+    onsets: list[object] = []
+    here.watch.onsets = cast(Any, SimpleNamespace(note=lambda *those: onsets.append(those)))
+    before: Any = SimpleNamespace(error="", before=None, state=state, time=1.0)
+    here.watch._looks[1] = before
+    assert await here.watch._glance(kept) == pytest.approx(pause)
+    if running:
+        assert reads == noted == []
+        return
+    assert reads == [(["ETA", "RFR", "NCR", "CHAN"], {"priority": Priority.POLL})]
+    look = cast(Any, here.watch.looks[1])
+    assert noted == [look]
+    assert (look.time, look.timeout) == (100.0, timeout)
+    if error is None:
+        assert (look.state, look.error, look.readings) == (state, "", {"RFR": "read"})
+        assert (look.before, look.contact) == (None, "answers")
+        assert used == [{"CHCF": "held", "RFR": "read"}]
+        assert onsets == [(1, state, 5000.0)]
+    else:
+        assert (look.state, look.error, look.readings) == (None, str(error), {})
+        assert (look.before, look.contact) == (before, "silent")
+        assert onsets == []
+    here.keep()
+    noted.clear()
+    await here.watch._glance(kept)
+    assert noted == [], "another session of the drive is kept now"

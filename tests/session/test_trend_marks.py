@@ -168,3 +168,16 @@ def test_frequency_in_a_trend_has_the_sign_of_its_direction_and_a_current_none(
     assert signed == [(parameter, 30.0, state)] * directed
     reading.number = None
     assert trends.trend_value(cast(Any, reading), state) is None
+
+
+def test_trend_keeps_the_points_of_ten_minutes(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(trends, "trend_values", lambda *_: (1.0, None, None))
+    trend = Trend(library.load("atv71"))
+    for time in (0.0, 100.0, 600.0):
+        trend.add(replace(READY, time=time))
+    assert [point.time for point in trend.points] == [0.0, 100.0, 600.0]
+    trend.add(replace(READY, time=600.5))
+    assert [point.time for point in trend.points] == [100.0, 600.0, 600.5]
+    trend.join([TrendPoint(0.25, ()), TrendPoint(0.5, ()), TrendPoint(600.0, ())])
+    assert [point.time for point in trend.points] == [0.5, 100.0, 600.0, 600.5]
+    assert trend.points[2].values == (1.0, None, None), "its own point counts"
