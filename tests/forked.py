@@ -24,6 +24,7 @@ from typing import IO, Any, NamedTuple
 
 import pytest
 
+from tests import sources
 from tests.sources import ROOT
 from tests.swapped import NotSwapped, functions_by_file, swap
 
@@ -107,6 +108,8 @@ class Forker:
         """Run the tests in the fork, and end it."""
         ran = 0
         result = Result("")
+        for parsed in (sources.tree_of, sources.nodes_of):
+            parsed.cache_clear()  # tests that check the source must see the defect
         try:
             if request["path"]:
                 file = str(Path.cwd() / request["path"])

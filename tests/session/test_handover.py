@@ -13,7 +13,7 @@ import pytest
 from tests.bus.peer import eventually
 from tests.limits import ARMED_FOR, REQUEST_ANSWERED_WITHIN
 from tui.bus.fake import FakeLine
-from tui.bus.line_events import ControlDenied, ControlRequested, DevicesStopped
+from tui.bus.line_events import ControlDenied, ControlRequested, DevicesStopped, NoticeReceived
 from tui.bus.program import Program
 from tui.bus.share.messages import AnyMessage, Armed, Claim, DriveRequested, RequestGranted
 from tui.bus.shared_state import LinePublisher
@@ -408,3 +408,13 @@ async def test_request_stays_open_for_fifteen_seconds(bench: Bench) -> None:
     assert bench.answers == []
     bench.clock.advance(3)
     await asyncio.to_thread(eventually, lambda: len(bench.answers) > 0)
+
+
+async def test_notice_of_another_program_is_an_event_of_a_stop_with_its_drive(
+    bench: Bench,
+) -> None:
+    for device in (1, 0):
+        bench.facts.events.emit(NoticeReceived(device, f"A notice about {device}."))
+    assert [(event.kind, event.text, event.device) for event in bench.events.events[-2:]] == [
+        ("stop", "A notice about 1.", 1), ("stop", "A notice about 0.", None),
+    ]  # fmt: skip
