@@ -23,7 +23,7 @@ from tui.session import journal as module
 from tui.session import journal_file
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
-from tui.session.journal import Entry, Journal
+from tui.session.journal import Entry, Journal, entry_time, now_text
 from tui.session.journal_reading import entries_of
 
 PROGRAM = """
@@ -325,3 +325,9 @@ def test_entries_wait_if_there_is_no_thread_to_write_them(
 
 def no_thread(thread: threading.Thread) -> None:
     raise RuntimeError("no thread can be started")
+
+
+@pytest.mark.parametrize(("wall", "millis"), [(5.0, "05.000"), (5.1239, "05.123")])
+def test_time_of_an_entry_has_milliseconds_and_its_zone(wall: float, millis: str) -> None:
+    assert entry_time(wall) == f"1970-01-01T00:00:{millis}+00:00"
+    assert len(entry_time(None)) == len(now_text()) == len(entry_time(wall))

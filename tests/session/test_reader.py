@@ -265,3 +265,23 @@ async def test_stored_plans_are_bounded() -> None:
     assert len(reader._plans) <= PLANS_KEPT
     readings = await reader.read(["P10", "P11"])
     assert [reading.raw for reading in readings.values()] == [10, 11]
+
+
+@pytest.mark.parametrize("block", [True, False])
+async def test_word_of_a_block_is_certain_only_if_it_is_read_alone(
+    block: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A refusal, or the word for no value, may be about another word of the block."""
+    profile = profile_of(parameter("P1", 1), reading={"unknown_word": 0x8000})
+    line = OneDrive({1: 0x8000})
+    reader = Reader(DriveSession(line, 1, profile))
+    monkeypatch.setattr(Reader, "_block_of", lambda *_: object() if block else None)
+    request = ReadRequest(1, 1, (Place("P1", 0),))
+    found = await reader._exchange(request, Priority.POLL)
+    assert {code: reading.raw for code, reading in found.items()} == (
+        {} if block else {"P1": 0x8000}
+    )
+    del line.registers[1]
+    found = await reader._exchange(request, Priority.POLL)
+    assert list(found) == ([] if block else ["P1"])
+    assert all("refused" in reading.error for reading in found.values())
