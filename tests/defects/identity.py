@@ -67,8 +67,8 @@ DEFECTS = (
     Defect(
         "contradicted-drive-armed",
         "tui/session/arming.py",
-        "return self._line.held or self.barred or",
-        "return self._line.held or",
+        "        if self.barred:\n            return self.barred\n",
+        "",
         "A drive is commanded with the words of another family.",
         (CONTRADICTION,),
     ),

@@ -64,8 +64,8 @@ DEFECTS = (
     Defect(
         "held-line-arms",
         "tui/session/arming.py",
-        "return self._line.held or self.barred",
-        "return self.barred",
+        "return self._line.held or self.trouble()",
+        "return self.trouble()",
         "The panel shows a drive as armed that accepts no command.",
         (f"{KNOWN}::test_held_line_arms_no_drive",),
     ),

@@ -120,8 +120,8 @@ DEFECTS = (
     Defect(
         "trend-repeats-the-last-value",
         "tui/session/monitor/trend.py",
-        "state = None if cycle.error else cycle.state\n        readings",
-        "state = cycle.state\n        readings",
+        "state = None if cycle.error else cycle.state\n    readings",
+        "state = cycle.state\n    readings",
         "A trend shows a motor running evenly while the drive does not answer.",
         ("tests/session/test_monitor_faults.py",),
     ),
