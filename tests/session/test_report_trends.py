@@ -16,9 +16,9 @@ from tui.session.record.ring import files_of_line
 from tui.session.report_trends import (
     ReportTrend,
     linked,
+    report_trend_lines,
     report_trends,
     trend_files,
-    trend_lines,
 )
 
 from . import test_changes as records
@@ -121,7 +121,7 @@ def test_files_and_links_have_the_name_of_the_report(tmp_path: Path) -> None:
     assert {name for name, _ in files.values()} == {"drive 4-trip.svg", "drive 4-run.svg"}
     for _, svg in files.values():
         assert ElementTree.fromstring(svg).tag.endswith("svg")
-    lines = trend_lines(found, linked(files))
+    lines = report_trend_lines(found, linked(files))
     assert [line for line in lines if line.startswith("#")] == ["## Last trip", "## Last run"]
     assert "![Curve of the trip](<drive 4-trip.svg>)" in lines
 

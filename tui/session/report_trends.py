@@ -146,7 +146,7 @@ def trend_file(stem: str, kind: TrendKind) -> str:
     return f"{stem}-{kind}.svg"
 
 
-def trend_lines(
+def report_trend_lines(
     trends: Iterable[ReportTrend], drawings: Mapping[TrendKind, Sequence[str]]
 ) -> list[str]:
     """Return the part of a report about trends, as Markdown; `drawings` are lines by kind."""

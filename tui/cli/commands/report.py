@@ -78,13 +78,13 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
 
 def _written_trends(trends: Sequence[ReportTrend], file: Path, *, force: bool) -> list[str]:
     """Write the curves beside the report; return its part about them. Raises Failure."""
-    from tui.session.report_trends import linked, trend_files, trend_lines
+    from tui.session.report_trends import linked, report_trend_lines, trend_files
 
     from ..shared.curve_text import curve_text
 
     if file == STANDARD:
-        return trend_lines(trends, {trend.kind: curve_text(trend) for trend in trends})
+        return report_trend_lines(trends, {trend.kind: curve_text(trend) for trend in trends})
     drawn = trend_files(trends, file.stem)
     for name, svg in drawn.values():
         write_down(file.with_name(name), svg, force=force)
-    return trend_lines(trends, linked(drawn))
+    return report_trend_lines(trends, linked(drawn))

@@ -126,7 +126,7 @@ class SetKeys(ParameterKeys):
         from tui.drive.settings.set_file import write_file
         from tui.session.journal_reading import entries_of
         from tui.session.report import report_text
-        from tui.session.report_trends import linked, report_trends, trend_files, trend_lines
+        from tui.session.report_trends import linked, report_trend_lines, report_trends, trend_files
 
         profile, device = self.session.profile, self.session.device
         recorder = self.app.opened.recorder if self.app.opened is not None else None
@@ -139,7 +139,7 @@ class SetKeys(ParameterKeys):
             drawn = trend_files(trends, path.stem)
             for name, svg in drawn.values():
                 write_file(path.with_name(name), svg)
-            return report_text(profile, values, entries, trend_lines(trends, linked(drawn)))
+            return report_text(profile, values, entries, report_trend_lines(trends, linked(drawn)))
 
         about = (
             "Identity, line, changed settings, control source, communication loss reaction, faults,"
