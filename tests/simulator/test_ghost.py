@@ -124,6 +124,13 @@ def test_other_functions_are_answered_as_recorded() -> None:
     assert played.at(0, "2B 0E 04 00") == "AB01"
 
 
+def test_echo_returns_its_own_data_if_the_drive_knew_the_function() -> None:
+    known = Played(recorded(0, "08 0000 1234", "08 0000 1234"))
+    assert known.at(0, "08 0000 5678") == "0800005678"
+    unknown = Played(recorded(0, "08 0000 1234", "88 01"))
+    assert unknown.at(0, "08 0000 5678") == "8801"
+
+
 def test_record_begins_again_and_says_so() -> None:
     played = Played(recorded(0, READ_ONE, "03 02 0001"), recorded(3.98, READ_ONE, "03 02 0002"))
     assert played.at(0, READ_ONE) == "03020001"

@@ -10,6 +10,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.keys.finding import find
 from tui.screens.monitor.run_keys import NOT_REHEARSED, NOT_SIMULATED, REHEARSAL
 from tui.simulator import BENCH
+from tui.simulator.plant.fault_history import fault_raw
 from tui.widgets.fields import Field
 from tui.widgets.plain import Plain
 
@@ -91,6 +92,18 @@ async def test_rehearsal_is_refused_on_a_real_line() -> None:
         await made.app.screen.run_action("rehearse")
         await until(made.pilot, lambda: NOT_REHEARSED[:40] in output(made.app))
         assert not isinstance(made.app.screen, Ask)
+
+
+async def test_rehearsal_names_a_fault_of_the_drive() -> None:
+    async with bench("atv21") as made:
+        assert made.app.opened is not None
+        made.app.opened.simulation = made.simulation
+        await made.app.screen.run_action("rehearse")
+        await until(made.pilot, lambda: bool(made.app.screen.query("Ask #about")))
+        about = str(made.app.screen.query_one("#about", Plain).render())
+        (code,) = re.findall(r"^trip (\w+)", about)
+        await made.pilot.press("escape")
+        assert made.drive().profile.fault(fault_raw(made.drive().profile, code)) is not None
 
 
 def test_rehearsal_names_every_command_but_planted_defects() -> None:

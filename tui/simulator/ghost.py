@@ -18,6 +18,8 @@ from .rules import Refusals, traits_of
 GHOST_READS = (3, 4)
 """Functions that read words, whose values the record has by address."""
 GHOST_WRITES = (6, 16)
+ECHO_REQUEST = bytes([8, 0, 0])
+"""Beginning of a request that is to be returned."""
 GHOST_REFUSALS = Refusals(1, 2, 2, 3, 4, 3)
 """Refusals of a drive whose profile is not known."""
 SHORTEST_RECORD = 1.0
@@ -98,7 +100,7 @@ class GhostDrive:
         self._refusals = GHOST_REFUSALS if profile is None else traits_of(profile).refusals
 
     def _add(self, item: RecordedExchange) -> None:
-        track = self._requests.setdefault(item.request, _Track())
+        track = self._requests.setdefault(_kind(item.request), _Track())
         track.add(item.at, item.took, item.reply)
         self._any.add(item.at, item.took, item.reply)
         if _is_good_read(item):
@@ -113,9 +115,11 @@ class GhostDrive:
         now = self._position()
         if now is None or not pdu:
             return None
-        track = self._requests.get(pdu)
+        track = self._requests.get(_kind(pdu))
         if track is not None:
             took, reply = track.at(now)
+            if reply is not None and reply.startswith(ECHO_REQUEST):
+                reply = pdu
             words = self._read(pdu, now) if reply is not None and not reply[0] & 0x80 else None
             return _reply(words or reply, took)
         if (words := self._read(pdu, now)) is not None:
@@ -174,6 +178,11 @@ class GhostDrive:
     def _unknown_read(self) -> int | None:
         assert self.profile is not None
         return self.profile.data.reading.unknown_exception
+
+
+def _kind(pdu: bytes) -> bytes:
+    """Return the part of a request by which it is found: an echo carries any data."""
+    return ECHO_REQUEST if pdu.startswith(ECHO_REQUEST) else pdu
 
 
 def _is_good_read(item: RecordedExchange) -> bool:

@@ -217,10 +217,10 @@ LOOKS_LIKE = "LI1=1,AI1=5V: logic inputs 1 or 0, analog 5V, 12mA, 50%."
 
 
 REHEARSAL = """\
-trip OCF · power off, on · wire cut, join · mains 180V · load 120%
+trip {fault} · power off, on · wire cut, join · mains 180V · load 120%
 inertia 3 · jam · key STOP · clear: undo all · state: show all
-in 5s: trip OCF waits for 5 s. No machine moves: it is simulated."""
-"""Commands of the bench that a person rehearses with, below the field for them."""
+in 5s: trip {fault} waits for 5 s. No machine moves: it is simulated."""
+"""Commands of the bench that a person rehearses with, with a fault of the drive."""
 
 
 class InputKeys(RunKeys):
@@ -241,7 +241,9 @@ class InputKeys(RunKeys):
         """Prompt for a trip, a loss of supply or another event of a simulated drive."""
         if (bench := self._bench(NOT_REHEARSED)) is not None:
             question = f"Rehearse on the simulated drive {self.session.device}"
-            self._change(bench, question, REHEARSAL, subject="Simulated drive", number=False)
+            codes = self.session.profile.data.faults.codes
+            about = REHEARSAL.format(fault=codes[0].code if codes else "1")
+            self._change(bench, question, about, subject="Simulated drive", number=False)
 
     def _bench(self, refusal: str) -> Bench | None:
         """Return the bench of a simulated line; None, and a message, on a real one."""
