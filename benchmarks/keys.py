@@ -73,13 +73,13 @@ TASKS = (
     ),
     Task(
         "look up a fault and clear it",
-        [("5", "Overbraking"), ARM, ("x", "Reset the fault?"), ("y!", "is reset.")],
+        [ARM, ("x", "ObF Overbraking. Likely cause"), ("y!", "is reset.")],
         [("h", "Overbraking"), ("Escape", "State"), ("x", "DONE")],
         lambda drive: drive.provoke("ObF"),
     ),
     Task(
         "change a ramp and keep it",
-        [("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", "Enter Stage"), *typed("5"),
+        [("/", "search"), *typed("ACC"), ("Enter", "Enter Stage"), *typed("5"),
          ("Enter!", "staged"), ARM, ("w", "Write 1"), ("y!", "verified"), ("S", "EEPROM?"),
          ("y!", "saved to EEPROM")],
         [("3", "settings"), ("/", "search"), *typed("ACC"), ("Enter", ""), ("Enter", ""),
@@ -88,17 +88,17 @@ TASKS = (
     ),
     Task(
         "back everything up",
-        [("C-s", "Back up to"), ("Enter!", "parameters")],
+        [("C-k", "Saved")],
         [("b", "Back up to"), ("Enter", "parameters")],
     ),
     Task(
         "compare with the last backup (before: the factory settings)",
-        [("C-o", "Compare with"), ("Enter!", "Differs")],
+        [("C-d", "Differs")],
         [("o", "Compare with"), *typed("factory"), ("Enter", "factory settings")],
     ),
     Task(
         "put the motor current into a scanner slot",
-        [("4", "Scanner"), ("Enter", "Map NMA1 to"), *typed("LCR"), ("Enter!", "1 staged"), ARM,
+        [("4", "Scanner"), ("Enter", "Map NMA1 to"), ("Down", ""), ("Enter!", "1 staged"), ARM,
          ("w", "Write 1"), ("y!", "all verified")],
         [("4", "Scanner"), ("Enter", "stands for"), *typed("LCR"), ("Enter", "proposed"),
          ("w", "Write 1"), ("y", "Written and read back")],
@@ -147,8 +147,8 @@ def main() -> None:
         terminal.run("new-session", "-d", "-x", "80", "-y", "24", command)
         panel = terminal.client()
         try:
-            # version 0.1 had its cursor on another line until the search had ended
-            terminal.wait_for("addresses answered" if arguments.before else "of 10 addresses")
+            # with its row; version 0.1 had its cursor elsewhere until the search had ended
+            terminal.wait_for("addresses answered" if arguments.before else "version")
             time.sleep(1.0)
             for task in TASKS:
                 steps = task.before if arguments.before else task.now

@@ -24,7 +24,7 @@ STEPS: tuple[tuple[list[str], float, str], ...] = (
     (["down"], 0.5, "control-source"),
     (["3"], 6.0, ""),
     (["slash", *"ramp", "enter"], 1.5, "parameters-found"),
-    (["slash", *NO_SEARCH, *"acc", "enter", "enter"], 0.5, ""),
+    (["slash", *NO_SEARCH, *"acc", "enter"], 0.5, ""),
     ([*"5.03"], 0.5, "parameters-edit"),
     (["enter", "slash", *NO_SEARCH, *"speed", "enter", "minus"], 1.0, "parameters"),
     (["a", "w"], 0.5, "parameters-write"),

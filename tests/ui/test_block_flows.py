@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from textual.widgets import Input
+from textual.widgets import Input, OptionList
 
 from tests.sweeps import kept
 from tui.drive.blocks.wire_cost import Cost, Saving
@@ -329,3 +329,23 @@ def test_shown_saving_is_the_difference_of_the_shown_costs(before: int, after: i
     line = cost_lines(editor, editor.proposals.blocks[0], costs, 120)[1].plain
     first, second, change = (float(text) for text in re.findall(r"([-+]?[\d.]+) ms", line)[:3])
     assert change == pytest.approx(second - first, abs=0.01)
+
+
+async def test_list_for_a_slot_begins_with_monitored_values_that_no_slot_maps() -> None:
+    async with bench("atv71") as made:
+        await to_blocks(made)
+        await made.pilot.press("down", "down", "enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, PickParameter))
+        options = made.app.screen.query_one(OptionList)
+        codes = [str(option.prompt).split()[0] for option in options.options]
+        assert codes[:2] == ["RFR", "LCR"]
+        assert codes.count("LCR") == 1
+        first = codes.index("none")
+        assert not {"ETA", "RFRD"} & set(codes[:first])  # mapped by the factory assignment
+        assert "ETA" in codes[first:]
+        await made.pilot.press("down", "enter")
+        await until(made.pilot, lambda: "LCR" in shown(made.app, "first"))
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, PickParameter))
+        again = made.app.screen.query_one(OptionList)
+        assert "LCR" not in [str(o.prompt).split()[0] for o in again.options][:first]

@@ -442,7 +442,7 @@ async def test_space_stops_outside_texts_only() -> None:
 
 
 @pytest.mark.parametrize("typed", kept(["", "4x"], "4x"))
-@pytest.mark.parametrize("way", ["3 slash a c c enter enter", "1 tab tab tab"])
+@pytest.mark.parametrize("way", ["3 slash a c c enter", "1 tab tab tab"])
 async def test_space_stops_while_a_number_is_typed(way: str, typed: str) -> None:
     """A value, an address: no space is ever typed there. A reference: `test_run_line`."""
     async with bench("atv71") as made:
@@ -611,3 +611,14 @@ async def test_enter_on_a_step_of_control_proposes_its_value_and_writes_nothing(
             ),
         )
         assert writes(made.app) == []
+
+
+async def test_question_of_a_reset_names_the_likeliest_cause() -> None:
+    async with bench("atv71") as made:
+        made.drive().provoke("ObF")
+        await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
+        await made.armed()
+        await made.pilot.press("x")
+        await until(made.pilot, lambda: "Likely cause: " in follows(made.app))
+        assert follows(made.app).startswith("ObF Overbraking. Likely cause: ")
+        assert "Remove the cause first." in follows(made.app)

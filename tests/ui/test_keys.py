@@ -285,7 +285,8 @@ def found(made: Bench) -> str:
 async def stage(made: Bench) -> None:
     """Something to write on Parameters and on Blocks, and an output to write through."""
     made.drive().set("NCA1", made.drive().profile["ACC"].address)
-    await made.pilot.press("slash", *"hsp", "enter")
+    await made.pilot.press("slash", *"hsp")
+    made.app.screen.set_focus(None)
     await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
     await made.pilot.press("minus", "4")
     await until(made.pilot, lambda: "ACC" in shown(made.app, "second"))

@@ -47,7 +47,8 @@ async def to_parameters(made: Bench) -> ParametersScreen:
 async def find(made: Bench, code: str) -> None:
     """Search for a code; wait until its value is there."""
     made.app.screen.query_one("#search", Input).value = ""
-    await made.pilot.press("slash", *code.lower(), "enter")
+    await made.pilot.press("slash", *code.lower())
+    made.app.screen.set_focus(None)  # Enter would edit the value
     await until(made.pilot, lambda: shown(made.app, "detail").startswith(f" {code} "))
     await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
 
@@ -190,7 +191,7 @@ async def test_edit_messages_are_true_while_the_motor_runs() -> None:
 async def test_parameter_is_found_from_every_screen() -> None:
     async with bench("atv312") as made:
         for key in "2567":
-            await made.pilot.press(key, "slash", *"hsp", "enter")
+            await made.pilot.press(key, "slash", *"hsp", "enter", "escape")
             await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
             await until(made.pilot, lambda: shown(made.app, "detail").startswith(" HSP "))
         assert writes(made.app) == []
@@ -550,3 +551,43 @@ async def test_s_in_write_results_asks_to_save() -> None:
         await made.pilot.press("y")
         await message(made, "saved to EEPROM")
         assert not screen.editor.unsaved
+
+
+async def test_enter_after_a_code_edits_it_and_after_words_goes_to_the_list() -> None:
+    async with bench("atv312") as made:
+        screen = await to_parameters(made)
+        await until(made.pilot, lambda: "ACC" in screen.editor.values.raws)
+        await made.pilot.press("slash", *"acc", "enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+        await made.pilot.press("escape", "escape", "slash", *"ramp", "enter")
+        await until(made.pilot, lambda: screen.focused is None)
+        assert made.app.screen is screen
+        assert screen.listed.searched
+
+
+def files_of(folder: Path) -> list[Path]:
+    """Parameter sets in a folder."""
+    return sorted(folder.glob("*.toml"))
+
+
+async def test_backup_by_one_key_is_the_newest_to_compare_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    async with bench("atv312") as made:
+        await made.pilot.press("ctrl+d")
+        await until(made.pilot, lambda: "No backup of this drive" in shown(made.app, "said"))
+        await made.pilot.press("ctrl+k")
+        await until(made.pilot, lambda: "Saved: " in shown(made.app, "said"))
+        [backup] = files_of(tmp_path)
+        other = read(backup).replace("device = 1", "device = 7", 1)
+        write(tmp_path / "newer.toml", other)
+        await made.pilot.press("ctrl+d")
+        await until(made.pilot, lambda: f"{backup.name}: " in shown(made.app, "said"))
+        await made.pilot.press("ctrl+k")
+        await until(
+            made.pilot,
+            lambda: isinstance(made.app.screen, Ask) or len(files_of(tmp_path)) > 2,
+        )
+        assert read(backup).replace("device = 1", "device = 7", 1) == other
+        assert writes(made.app) == []

@@ -121,7 +121,8 @@ async def parameters(made: Bench) -> None:
         await made.pilot.press("slash")
         await typed(made, text)
     made.app.screen.query_one("#search", Input).value = ""
-    await made.pilot.press("slash", *"acc", "enter")
+    await made.pilot.press("slash", *"acc")
+    made.app.screen.set_focus(None)
     await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
     await dialog(made, "enter", EditNumber)
     for key in ("ctrl+s", "ctrl+r"):

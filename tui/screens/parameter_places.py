@@ -34,6 +34,14 @@ class ParameterPlaces(Places):
         """Save the settings of the open drive to its EEPROM."""
         await self._ask_parameters("action_save_eeprom")
 
+    async def action_back_up(self) -> None:
+        """Save the settings of the open drive under a new name."""
+        await self._ask_parameters("action_back_up_now")
+
+    async def action_differ(self) -> None:
+        """Compare the open drive with its newest backup."""
+        await self._ask_parameters("action_compare_newest")
+
     async def action_report(self) -> None:
         """Write a report on the open drive to a file."""
         await self._ask_parameters("action_report")

@@ -18,6 +18,7 @@ from tui.drive.values import NOT_AVAILABLE, set_bits
 from tui.safety import LOOK_IS_OLD
 
 from .blocks.editor import read_words
+from .blocks.proposals import watched_first
 from .console import DriveConsole
 
 
@@ -118,6 +119,13 @@ class CommunicationMap:
     def own(self) -> UserWords:
         """The four words; an address of 0 means none."""
         return self.console.blocks.words
+
+    @property
+    def useful(self) -> list[str]:
+        """Codes of the monitored values that are not among the words."""
+        profile = self.console.session.profile
+        chosen = {word.address for word in self.own}
+        return [code for code in watched_first(profile) if profile[code].address not in chosen]
 
     async def read_own(self) -> None:
         """Read the words. Raises the line's errors."""

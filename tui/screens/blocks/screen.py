@@ -20,7 +20,7 @@ from tui.screens.blocks.view import (
     table_lines,
     user_word_lines,
 )
-from tui.session.blocks.proposals import monitoring_stretches
+from tui.session.blocks.proposals import monitoring_stretches, useful_codes
 from tui.session.console import DriveConsole
 from tui.widgets.drawing import rule, wrapped
 from tui.widgets.lines import Lines
@@ -165,7 +165,8 @@ class BlocksScreen(BlockKeys):
                 self._try(lambda: self.block_editor.proposals.pick(block, place, code))
 
         slot = block.slots[place]
-        self.app.push_screen(PickParameter(self.session.profile, block, slot), reported)
+        useful = useful_codes(self.block_editor.proposals, block)
+        self.app.push_screen(PickParameter(self.session.profile, block, slot, useful), reported)
 
     def action_shift(self, step: int) -> None:
         """Move the slot's mapping by so many slots, staged."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 from functools import partial
@@ -16,7 +17,7 @@ from textual.widgets import OptionList
 from tui.bus.errors import LineError
 from tui.drive.fault_reset import no_fault, reset_codes, reset_follows
 from tui.drive.orders import OrderRefused, chart_in_force
-from tui.drive.profile.schema import CommandOption, OrderId
+from tui.drive.profile.schema import CommandOption, FaultCode, OrderId
 from tui.session.work import Outcome
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
@@ -29,6 +30,9 @@ if TYPE_CHECKING:
     from ..dialogs.now import MotorStates
 
 OPTION_HINT = hint(("Up, Down", "Choose"), ("y", "Write"), ("Esc or q", "Cancel"))
+
+
+LIKELY_CAUSE = "{name}. Likely cause: {cause}."
 
 
 class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
@@ -178,19 +182,42 @@ class OrderKeys(TeachKeys):
         if not self._require_armed():
             return
         follows = f"{REMOVE_CAUSE} {reset_follows(profile, raws, {})}"
+        fault = latest.state.fault if latest is not None and not latest.error else None
         work = partial(self.commander.order, "reset")
         question = self._ask("Reset the fault?", follows, "Reset", "Cancel", work)
 
         async def look_at_inputs() -> None:
             try:
                 found = await self.console.read(reset_codes(profile))
+                now = {code: r.raw for code, r in found.items() if r.raw is not None}
+                follows = reset_follows(profile, {**self.session.image.raws, **now}, now)
+                question.tell_follows(f"{REMOVE_CAUSE} {follows}")
+                cause = await self._likely_cause(fault)
             except LineError:
                 return  # the question says that the inputs have not been read
-            now = {code: r.raw for code, r in found.items() if r.raw is not None}
-            known = {**self.session.image.raws, **now}
-            question.tell_follows(f"{REMOVE_CAUSE} {reset_follows(profile, known, now)}")
+            if cause:
+                question.tell_follows(f"{cause} {REMOVE_CAUSE} {follows}")
 
         self.run_worker(look_at_inputs, exclusive=True, group="reset")  # type: ignore[arg-type]
+
+    async def _likely_cause(self, fault: FaultCode | None) -> str:
+        """Return the likeliest cause of a fault as a sentence; empty without help on it.
+
+        Raises LineError.
+        """
+        from tui.drive.hints import advice_now, codes_to_read
+
+        profile = self.session.profile
+        # away from the loop: the help is read from its file
+        guide = await asyncio.to_thread(lambda: profile.guide)
+        help_ = guide.fault(fault.raw if fault is not None else None)
+        if help_ is None:
+            return ""
+        found = await self.console.read(codes_to_read(profile, help_))
+        raws = {code: r.raw for code, r in found.items() if r.raw is not None}
+        left = advice_now(profile, help_, {**self.session.image.raws, **raws}, present=True)
+        name = f"{fault.code} {fault.name}" if fault is not None else help_.name
+        return LIKELY_CAUSE.format(name=name, cause=left.probable[0]) if left.probable else ""
 
     def action_take_control(self) -> None:
         """Ask, then take control from the terminals."""

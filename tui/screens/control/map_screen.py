@@ -174,7 +174,8 @@ class MapScreen(PanelScreen):
                 self.look()
 
         profile = self.console.session.profile
-        self.app.push_screen(PickParameter(profile, None, f"word {place + 1}"), chosen)
+        useful = self._map.useful
+        self.app.push_screen(PickParameter(profile, None, f"word {place + 1}", useful), chosen)
 
     def action_page(self, step: int) -> None:
         """Scroll the map by its visible rows, `step` times."""

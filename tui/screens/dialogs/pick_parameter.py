@@ -42,11 +42,17 @@ class PickParameter(Question[str | None]):
         Binding("down", "step(1)", "down", show=False, priority=True),
     ]
 
-    def __init__(self, profile: Profile, block: Block | None, slot: str) -> None:
-        """`slot` is a slot of the block, or the place of a word without one."""
+    def __init__(
+        self, profile: Profile, block: Block | None, slot: str, proposed: Sequence[str] = ()
+    ) -> None:
+        """`slot` is a slot of the block, or the place of a word without one.
+
+        The codes `proposed` are listed first until something is typed.
+        """
         super().__init__()
         self._profile, self._block, self._slot = profile, block, slot
-        self._found: list[Parameter] = []
+        self._proposed = proposed
+        self._answers: list[str] = []
 
     def dialog(self) -> ComposeResult:
         """A search field, and its results."""
@@ -71,12 +77,18 @@ class PickParameter(Question[str | None]):
 
     def _list(self, search: str) -> None:
         every = choices(self._profile, self._block, search)
-        self._found = every[:LISTED_MOST]
+        by_code = {parameter.code: parameter for parameter in every}
+        first = [] if search else [by_code[code] for code in self._proposed if code in by_code]
+        found = [*first, *(p for p in every[:LISTED_MOST] if p not in first)]
+        self._answers = [parameter.code for parameter in found]
         options = self.query_one(OptionList)
         options.clear_options()
-        lines = pick_lines(self._found, min(WIDEST, self.app.size.width) - AROUND)
-        unused = [] if search else [Text(UNUSED_SLOT if self._block else NO_WORD_HERE, FAINT)]
-        options.add_options([entry(line) for line in (*unused, *lines)])
+        lines = pick_lines(found, min(WIDEST, self.app.size.width) - AROUND)
+        if not search:
+            unused = Text(UNUSED_SLOT if self._block else NO_WORD_HERE, FAINT)
+            self._answers.insert(len(first), "none")
+            lines.insert(len(first), unused)
+        options.add_options([entry(line) for line in lines])
         options.highlighted = 0 if options.option_count else None
         self.query_one("#count", Plain).update(matches_text(len(every), LISTED_MOST))
 
@@ -96,20 +108,15 @@ class PickParameter(Question[str | None]):
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Answer with the selected entry."""
-        at = self.query_one(OptionList).highlighted
-        self._take(at, searched=bool(event.value))
+        self._take(self.query_one(OptionList).highlighted)
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Answer with the clicked entry."""
-        self._take(event.option_index, searched=bool(self.query_one(Input).value))
+        self._take(event.option_index)
 
-    def _take(self, at: int | None, *, searched: bool) -> None:
-        if at is None:
-            return
-        if not searched and at == 0:
-            self.answer("none")
-            return
-        self.answer(self._found[at if searched else at - 1].code)
+    def _take(self, at: int | None) -> None:
+        if at is not None:
+            self.answer(self._answers[at])
 
 
 def pick_lines(parameters: Sequence[Parameter], width: int) -> list[Text]:

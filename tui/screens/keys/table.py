@@ -48,6 +48,8 @@ STOPS_ALL, STOPS_NONE = "STOP ALL", "cannot stop here"
 STOPS_LIVE = "STOP LIVE ALL"
 """The same in a replay with live lines beside it; without any it is `NO_MOTOR`."""
 SAVE = "Save to a file: a backup, an assignment, the frames, or the record of a trip."
+BACK_UP = "Back up the open drive now, under a new name in this folder."
+DIFFER = "Show what differs from the newest backup of the open drive."
 OPEN = "Open a file: compare a parameter set, or stage an assignment."
 REPORT_DRIVE = "Report on the open drive: read everything and write a file (Markdown)."
 TYPE_ADDRESS = "Type the address of a drive on this line; Enter opens it."
@@ -95,6 +97,8 @@ APP_ACTIONS: tuple[Action, ...] = (
     app_action("replay_time", "@", "", "In a replay: type a time to go to."),
     app_action("save_shown", "ctrl+s", "", SAVE),
     app_action("open_file", "ctrl+o", "", OPEN),
+    app_action("back_up", "ctrl+k", "", BACK_UP),
+    app_action("differ", "ctrl+d", "", DIFFER),
     app_action("report", "ctrl+r", "", REPORT_DRIVE),
     app_action("eeprom", "S", "", EEPROM),
     app_action("command_palette", "ctrl+p", "more", "Find an action by typing words."),

@@ -169,7 +169,10 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     def typing_keys(self) -> Sequence[tuple[str, str]]:
         """The keys of the search field."""
-        return ("Enter", "list"), JOINS_KEY, ("Esc", "clear")
+        exact = (
+            self.query_one("#search", Input).value.strip().casefold() == self.listed.code.casefold()
+        )
+        return ("Enter", "edit" if exact else "list"), JOINS_KEY, ("Esc", "clear")
 
     def on_input_changed(self) -> None:
         """Search while typing, and select the best match."""
@@ -177,9 +180,12 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             self.listed.best()
         self.list_again()
 
-    def on_input_submitted(self) -> None:
-        """Return to the table."""
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Return to the table; edit the parameter under the cursor if its code was typed."""
         self.set_focus(None)
+        code = self.listed.code
+        if event.value.strip().casefold() == code.casefold() and self.can_edit(code):
+            self.action_edit()
 
     def action_leave(self) -> None:
         """Leave the search, then a selection, then the screen."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -32,6 +33,7 @@ from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
+    from tui.session.drive import DriveSession
 
 SKIPPED_KEYS = hint(("Enter or Esc", "Close"), ("Up, Down", "Scroll"))
 
@@ -97,8 +99,27 @@ def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbou
     return FileAbout(drive, differences if count else "equal")
 
 
+NO_BACKUP = "No backup of this drive on this line in this folder or in the backup folder."
 SAVED_ALL = "Saved: {count} parameters, in {path}"
 SAVED_SOME = "Saved: {count} parameters, without {absent} that the drive does not report, in {path}"
+
+
+def newest_backup(session: DriveSession) -> Path | None:
+    """Return the newest parameter set of a drive in the folders of backups; reads their files.
+
+    The file names the family, the line and the address, so it is not one of another machine.
+    """
+    from tui.session.paths import state_folder
+
+    from ..dialogs.pick_file import files_in
+
+    wanted = (session.profile.id, session.line_text, session.device)
+    for path in files_in([Path.cwd(), state_folder()]):
+        with suppress(DriveError):
+            head = read_set(path, path.name).head
+            if (head.profile, head.line, head.device) == wanted:
+                return path
+    return None
 
 
 class SetKeys(ParameterKeys):
@@ -108,18 +129,32 @@ class SetKeys(ParameterKeys):
 
     def action_save_file(self) -> None:
         """Ask for a file, read the settings, write them."""
+        about = "Every setting, in units and raw, one per line (TOML)."
+        self._ask_for_file("Back up to", "toml", about, self._set_text, self._setting_codes)
+
+    def action_back_up_now(self) -> None:
+        """Read the settings and write them to a new file; ask for its name if it exists already."""
+        path = self._new_path("toml")
+        if fault_of_new(str(path)):
+            self.action_save_file()
+        else:
+            work = self._read_to_file(path, self._set_text, self._setting_codes)
+            self.run_worker(work, exclusive=True, group="sets")
+
+    def _set_text(self, values: ParameterSet, _path: Path) -> str:
         from tui.drive.settings.parameter_set import dump_set
+
+        return dump_set(self.session.profile, values)
+
+    @property
+    def _setting_codes(self) -> list[str]:
         from tui.session.read.upload import setting_codes
 
-        about = "Every setting, in units and raw, one per line (TOML)."
-        profile = self.session.profile
-        self._ask_for_file(
-            "Back up to",
-            "toml",
-            about,
-            lambda values, _: dump_set(profile, values),
-            setting_codes(profile),
-        )
+        return setting_codes(self.session.profile)
+
+    def _new_path(self, suffix: str) -> Path:
+        when = time.strftime("%Y%m%d-%H%M")
+        return Path.cwd() / f"{self.session.profile.id}-{self.session.device}-{when}.{suffix}"
 
     def action_report(self) -> None:
         """Ask for a file, read everything, and write a report for a customer."""
@@ -158,15 +193,12 @@ class SetKeys(ParameterKeys):
         """Ask for a file, read these codes (all if empty), and write the text to it."""
         from ..dialogs.ask import Ask
 
-        when = time.strftime("%Y%m%d-%H%M")
-        name = f"{self.session.profile.id}-{self.session.device}-{when}.{suffix}"
-
         def reported(name: str | None) -> None:
             if name:
                 work = self._read_to_file(Path(name).expanduser(), text, codes)
                 self.run_worker(work, exclusive=True, group="sets")
 
-        proposed = str(Path.cwd() / name)
+        proposed = str(self._new_path(suffix))
         requested = Ask(question, fault_of_new, text=proposed, about=about, takes="Save")
         self.app.push_screen(requested, reported)
 
@@ -226,6 +258,17 @@ class SetKeys(ParameterKeys):
             return about_set(path, profile, raws)
 
         self.app.push_screen(PickFile(question, others, folders, about), reported)
+
+    def action_compare_newest(self) -> None:
+        """Compare with the newest backup of this drive on this line."""
+        self.run_worker(self._compare_newest(), exclusive=True, group="sets")
+
+    async def _compare_newest(self) -> None:
+        newest = await asyncio.to_thread(newest_backup, self.session)
+        if newest is None:
+            self.note(NO_BACKUP, "Press Ctrl+O to choose a file.")
+        else:
+            await self._compare(str(newest))
 
     async def _compare(self, text: str) -> None:
         editor = self.editor

@@ -51,6 +51,12 @@ class StageKeys(ParameterKeys):
         if self.listed.code:
             self.ask_look(self.listed.code)
 
+    def can_edit(self, code: str) -> bool:
+        """Return True if a value may be staged; a running motor prevents only writing."""
+        refused = self.editor.refusal(code) if code else None
+        allowed = refused is None or refused.reason == "running"
+        return bool(code) and allowed and code in self.editor.values.raws
+
     def _may_edit(self, code: str) -> bool:
         """Return True if it may be staged; a running motor prevents only writing."""
         refused = self.editor.refusal(code)

@@ -15,16 +15,22 @@ from tui.drive.blocks.assignment import (
     assignment,
     factory,
     slot_changes,
+    slot_target,
     slots_of,
 )
 from tui.drive.blocks.picking import pick
 from tui.drive.blocks.slot_rules import Problem, assignment_problems
 from tui.drive.blocks.wire_cost import Saving, Stretch, best_assignment, saving, stretches
-from tui.drive.profile.schema import Block
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block, Quantity
 
 from ..drive import DriveSession
 from ..monitor.rates import monitoring_codes, rates_of
+from ..monitor.trend import readout_parameter
 from .mapping import wire_timing
+
+LARGE: tuple[Quantity, ...] = ("output_frequency", "motor_current")
+"""Quantities in Monitor's large figures."""
 
 
 @dataclass(slots=True)
@@ -156,6 +162,20 @@ class Proposals:
                 key: saving(self.session.profile, codes, timing, before_raws, after_raws)
             }
         return self._costs[key]
+
+
+def useful_codes(proposals: Proposals, block: Block) -> list[str]:
+    """Return the codes of the monitored values that no slot of the block maps."""
+    profile, plan = proposals.session.profile, proposals.proposed(block)
+    targets = (slot_target(profile, block, raw) for raw in (plan.raws if plan else ()))
+    mapped = {target.code for target in targets if target is not None}
+    return [code for code in watched_first(profile) if code not in mapped]
+
+
+def watched_first(profile: Profile) -> list[str]:
+    """Return the codes of the monitored values, those in Monitor's large figures first."""
+    large = [p.code for quantity in LARGE if (p := readout_parameter(profile, quantity))]
+    return list(dict.fromkeys((*large, *monitoring_codes(profile))))
 
 
 def monitoring_stretches(session: DriveSession) -> list[Stretch]:
