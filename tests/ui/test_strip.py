@@ -197,7 +197,7 @@ def test_marks_move_no_tab() -> None:
     assert marked == bare.replace("3 Parameters", "3●Parameters")
 
 
-@pytest.mark.parametrize(("width", "gap"), [(60, 3), (80, 2), (120, 4), (200, 4)])
+@pytest.mark.parametrize(("width", "gap"), [(60, 2), (80, 1), (120, 4), (200, 4)])
 def test_tabs_are_evenly_spaced(width: int, gap: int) -> None:
     line = tabs_line(TABS, MONITOR, {}, width).plain
     assert re.findall(r"(?<=\w)( +)(?=\d)", line) == [" " * gap] * (len(TABS) - 1)

@@ -77,7 +77,7 @@ def sign_of(event: TrendEvent, plain: bool) -> tuple[str, Style]:
 def _line(event: TrendEvent, plain: bool, width: int, *, selected: bool) -> Text:
     sign, style = sign_of(event, plain)
     lead = (">" if plain else "▸") if selected else " "
-    line = Text(lead, KEY, no_wrap=True)
+    line = Text(no_wrap=True).append(lead, KEY)
     line.append(time.strftime("%H:%M:%S ", time.localtime(event.wall)), FAINT)
     line.append(sign, style)
     drive = f"{event.device} " if event.device is not None else ""
@@ -93,9 +93,8 @@ def events_lines(
     events: Sequence[TrendEvent], selected: int | None, rows: int, width: int, plain: bool
 ) -> list[Text]:
     """Return the list in exactly `rows` rows, with the selected event in it."""
-    head = Text("Events", STRONG, no_wrap=True).append("  newest first", FAINT)
-    if not events:
-        head = Text("Events", STRONG, no_wrap=True).append("  none", FAINT)
+    shown = "  newest first" if events else "  none"
+    head = Text(no_wrap=True).append("Events", STRONG).append(shown, FAINT)
     room = max(1, rows - 1)
     first = 0 if selected is None else max(0, min(selected - room // 2, len(events) - room))
     lines = [

@@ -22,7 +22,7 @@ from .loading import first_bands
 from .page import TrendPage
 from .table import TableRow
 from .traces import BandTrace, reach_of_trace, value_at
-from .view import scale_for, trend_lines, trend_room
+from .view import scale_for, trend_room, trend_rows
 
 AGAIN_AFTER = 3.0
 """Seconds after which the record is read again: it then has what was read while it was loaded."""
@@ -67,7 +67,7 @@ class TrendScreen(BandKeys):
         if self._may_wait():
             return
         height = self.size.height - 4
-        lines = trend_lines(self._view(), width, height)
+        lines = trend_rows(self._view(), width, height)
         self.put_all("trend", lines)
 
     def _may_wait(self) -> bool:

@@ -81,7 +81,7 @@ def trend_room(width: int, height: int, bands: int, *, events: bool) -> TrendRoo
     )  # fmt: skip
 
 
-def trend_lines(view: TrendView, width: int, height: int) -> list[Text]:
+def trend_rows(view: TrendView, width: int, height: int) -> list[Text]:
     """Return the lines of the screen, at most `height`."""
     if not view.bands:
         return [Text(f"  {NO_BANDS}", FAINT)]
@@ -288,5 +288,5 @@ def _marks_line(view: TrendView) -> Text:
     if view.selected == len(view.bands):
         return Text("  New band: press Enter to choose its parameter.", KEY)
     if not text:
-        return Text("  M sets mark A at the newest value, or at the cursor.", FAINT)
+        return Text("  Left opens the cursor. M sets mark A there, or at the newest value.", FAINT)
     return text
