@@ -283,6 +283,21 @@ def test_changes_are_selected_by_drive_line_and_time(folder: Path) -> None:
     assert len(found(folder, lines=["/dev/ttyNone"]).runs) == 1
 
 
+def test_record_of_a_single_line_has_the_name_of_that_line(folder: Path, tmp_path: Path) -> None:
+    own = tmp_path / "own"
+    write(own, each_second(0, 5, FORWARD), line="serial:/dev/pts/3,19200,8E1")
+    private = {"sim:atv71": own}
+    (run,) = found(folder, private=private).runs
+    assert run.line == "sim:atv71"
+    assert found(folder, private=private, lines=["sim:atv31"]).runs == []
+
+
+def test_file_that_was_set_aside_as_damaged_is_not_read_again(folder: Path) -> None:
+    folder.mkdir()
+    (folder / "2024-10-04_line-1.damaged-1728079200.sqlite").write_bytes(b"x")
+    assert found(folder).unread == []
+
+
 def test_run_that_began_before_the_time_has_its_begin(folder: Path) -> None:
     write(folder, [status(0, READY), *each_second(1, 50, FORWARD), status(50, READY)])
     since = datetime.fromtimestamp(START + 30, UTC)

@@ -6,7 +6,7 @@ Writes, trips and tests come from the journal, runs and lost links from the reco
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime, time, timedelta
 from pathlib import Path
@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from .connect.line_key import line_key
 from .journal import Entry, Journal, entry_time
 from .journal_reading import DamagedLine, completed, read_journal, selected, time_of
-from .record.ring import RECORD_SUFFIX, SECONDS_A_DAY, day_of_record
+from .record.ring import DAMAGED_MARK, RECORD_SUFFIX, SECONDS_A_DAY, day_of_record
 
 if TYPE_CHECKING:
-    from .record.runs import LostLink, RecordedRun
+    from .record.runs import LostLink, RecordedRun, RecordEvents
     from .report import Trip
 
 _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
@@ -115,12 +115,16 @@ def read_changes(
     device: int | None = None,
     lines: Sequence[str] = (),
     since: datetime | None = None,
+    private: Mapping[str, Path] | None = None,
 ) -> ChangeList:
     """Read the changes from the journal and from the records in a folder.
 
-    `lines` selects lines by one of their spellings; without any, all are read. It takes
-    some seconds for a full record. Raises OSError for a journal that cannot be read.
+    `lines` selects lines by one of their spellings; without any, all are read. `private` has
+    folders of single lines by their texts. It takes some seconds for a full record. Raises OSError
+    for a journal that cannot be read.
     """
+    from .record.runs import read_events
+
     kept = list(read_journal(Journal().files))
     entries = completed(item for item in kept if isinstance(item, Entry))
     shown = selected(entries, device=device, lines=lines, since=since)
@@ -128,8 +132,9 @@ def read_changes(
     found.damaged = [item for item in kept if isinstance(item, DamagedLine)]
     keys = {line_key(line) for line in lines}
     begin = 0.0 if since is None else since.timestamp()
-    for paths in _files_by_line(folder, begin - RUN_SEARCHED):
-        _add_record(found, paths, device, keys, begin)
+    for text, each in (("", folder), *(private or {}).items()):
+        for paths in _files_by_line(each, begin - RUN_SEARCHED):
+            _add_record(found, read_events(paths), text, device, keys, begin)
     found.runs.sort(key=lambda item: item.run.begun)
     found.losses.sort(key=lambda item: item.loss.begun)
     return found
@@ -140,25 +145,27 @@ def _files_by_line(folder: Path, begin: float) -> Iterator[list[Path]]:
     by_line: dict[str, list[Path]] = {}
     for path in sorted(folder.glob(f"*{RECORD_SUFFIX}")):
         day = day_of_record(path)
-        if day is not None and day >= begin // SECONDS_A_DAY:
+        is_damaged = DAMAGED_MARK in path.name
+        if day is not None and day >= begin // SECONDS_A_DAY and not is_damaged:
             by_line.setdefault(path.name.partition("_")[2], []).append(path)
     yield from by_line.values()
 
 
 def _add_record(
     found: ChangeList,
-    paths: Sequence[Path],
+    record: RecordEvents,
+    text: str,
     device: int | None,
     keys: Collection[str],
     begin: float,
 ) -> None:
-    """Add the runs and lost links in the files of one line."""
-    from .record.runs import lost_lines, read_events, runs_of
-
-    record = read_events(paths)
+    """Add the runs and lost links of one line; `text` is its name, if not that of the record."""
     found.unread += record.unread
-    if not record.files or (keys and line_key(record.line) not in keys):
+    line = text or record.line
+    if not record.files or (keys and line_key(line) not in keys):
         return
+    from .record.runs import lost_lines, runs_of
+
     line_losses = list(lost_lines(record))
     losses, runs = list(line_losses), []
     for each, profile in sorted(record.profiles.items()):
@@ -167,9 +174,9 @@ def _add_record(
             own, silent = runs_of(record, each, profile, since, _END_OF_TIME)
             runs += own
             losses += [loss for loss in silent if not _is_within(loss, line_losses)]
-    found.runs += [LineRun(record.line, run) for run in runs if run.ended >= begin]
+    found.runs += [LineRun(line, run) for run in runs if run.ended >= begin]
     found.losses += [
-        LineLoss(record.line, loss) for loss in losses if loss.ended is None or loss.ended >= begin
+        LineLoss(line, loss) for loss in losses if loss.ended is None or loss.ended >= begin
     ]
 
 

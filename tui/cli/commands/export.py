@@ -217,7 +217,8 @@ def _export_values(wish: ExportOptions, record: RecordEvents) -> None:
     for found in (item for each in histories.values() for item in each.values()):
         wish.messages |= dict.fromkeys(found.troubles)
     if not any(found.points for each in histories.values() for found in each.values()):
-        raise Failure(f"{wish.source} has no values of these codes in that time.", USAGE)
+        text = f"{wish.source} has no values of these codes in that time."
+        raise Failure(" ".join([text, *wish.messages]), USAGE)
     triggers = [event.utc / 1e6 for event in record.of("trigger")]
     table = ValueTable(histories, triggers)
     rows = heapq.merge(

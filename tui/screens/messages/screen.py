@@ -6,6 +6,7 @@ import asyncio
 import time
 from datetime import datetime
 from functools import partial
+from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
@@ -111,7 +112,9 @@ class MessagesScreen(PanelScreen):
         from tui.session.changes import read_changes
         from tui.session.record.ring import record_folder
 
-        read = partial(read_changes, record_folder(), since=since)
+        opened = [line.opened for line in self.app.panel_lines]
+        private = {item.text: Path(item.private.name) for item in opened if item.private}
+        read = partial(read_changes, record_folder(), since=since, private=private)
         try:
             found: ChangeList | str = await asyncio.to_thread(read)
         except OSError as error:

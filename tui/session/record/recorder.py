@@ -19,6 +19,7 @@ from tui.drive.sentences import counted
 
 from .reduction import CLOCK_JUMP
 from .ring import (
+    DAMAGED_MARK,
     MOST_RECORDED,
     SECONDS_A_DAY,
     files_of_line,
@@ -278,7 +279,7 @@ class LineRecorder:
 
     def _set_aside(self, error: RecordDamaged) -> None:
         path = error.path
-        aside = path.with_stem(f"{path.stem}.damaged-{time.time():.0f}")
+        aside = path.with_stem(f"{path.stem}{DAMAGED_MARK}{time.time():.0f}")
         path.replace(aside)
         for side in ("-wal", "-shm"):
             with suppress(OSError):

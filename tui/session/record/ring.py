@@ -11,6 +11,8 @@ from pathlib import Path
 from ..paths import state_folder
 
 RECORD_SUFFIX = ".sqlite"
+DAMAGED_MARK = ".damaged-"
+"""Part of the name of a damaged file that was renamed, before its time."""
 MOST_RECORDED = 256 << 20
 """Bytes of all files of the record."""
 ROOM_LEFT = 8 << 20
