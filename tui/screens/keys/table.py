@@ -24,7 +24,7 @@ STOP_ANYWHERE = "Stop the open drive on its ramp, even while typing text."
 STOP_ALL = "Stop all drives of all open lines on their ramps."
 WHILE_OPENING: tuple[KeyLabel, ...] = (("leave", "Esc", "cancel"), ("help", "?", "help"))
 """Keys that work while a line is being opened, besides the stop keys."""
-NEVER_DROPPED = ("stop_by_space", "help")
+NEVER_DROPPED = ("stop_by_space", "no_motor", "help")
 """Actions that stay in the key bar in the narrowest terminal."""
 WHILE_TYPING: tuple[KeyLabel, ...] = (
     ("command_palette", "^p", "more"),
@@ -200,7 +200,7 @@ def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
     While a text is being typed (`typing`), Space is text and the key is F12.
     """
     if stops == NO_MOTOR:
-        return [("stop_by_space", "", NO_MOTOR)]
+        return [("no_motor", "", NO_MOTOR)]
     keys = [("stop_by_space", "F12" if typing else "Space", stops)]
     return (
         keys
