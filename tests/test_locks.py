@@ -62,6 +62,7 @@ WITHOUT_LOCK = {
     "ReplayLine._work": ("_workers", "only the loop of the line changes it"),
     "ReplayLine.close": ("_closed", "set once"),
     "ReplayLine.open": ("_thread", "set once, before the line is used"),
+    "ReplayLine.trace": ("_frames", "replaced as a whole"),
     "ReplayLine.spawn": ("_workers", "only the loop of the line changes it"),
     "LineRecorder.note": ("_waiting", "a deque, changed in one step"),
     "LineRecorder.waiting": ("_waiting", "read in one step"),

@@ -40,7 +40,7 @@ def test_panel_shows_a_recorded_trip_again_and_promises_no_stop(
     (path,) = record_files()
     replay = second_terminal([*DRIVEPANEL, "replay", str(path), "-d", "1"])
     replay.wait_for("REPLAY", "nothing is sent", "no motor to stop", "Output Hz")
-    replay.wait_for("Next: drive 1: Tripped on ObF")
+    replay.wait_for("Next, in ", "drive 1: Tripped on ObF")
     assert "FAULT" not in replay.text()
     replay.press("#")  # the trip, 2 s before it
     replay.wait_for("at reference")

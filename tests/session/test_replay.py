@@ -301,3 +301,12 @@ def test_record_that_is_being_written_shows_its_new_replies(tmp_path: Path) -> N
         line.clock.end = BEGIN + 10
         asyncio.run(line.run_to(BEGIN + 5))
         assert words(line) == (12,)
+
+
+def test_frames_before_the_time_are_those_of_the_wire(tmp_path: Path) -> None:
+    path = record(tmp_path, row(1, (10,)), row(3, (12,)))
+    with replayed(path, 2.0) as line:
+        assert [(item.direction, item.data[:-2].hex()) for item in line.trace] == [
+            ("out", "010300640001"),
+            ("in", "010302000a"),
+        ]

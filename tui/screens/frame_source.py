@@ -210,7 +210,7 @@ class FrameSource:
             return None
         wall = following.utc / 1e6
         drive = f"drive {following.device}: " if following.device else ""
-        text = f"Next: {drive}{following.text.rstrip('.')}, in {wall - now:.0f} s."
+        text = f"Next, in {wall - now:.0f} s: {drive}{following.text}"
         return BarMessage(at(wall), text, "next", 0.0)
 
     def _event(self) -> Event | None:

@@ -2,31 +2,33 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from collections.abc import Callable
 from contextlib import suppress
 from typing import NamedTuple
 
-from tui.bus.api import Priority
 from tui.bus.errors import LineError
 from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile, digest_of
-from tui.drive.values import word_count
+from tui.drive.values import from_words, word_count
 
 from .connect.identify import DriveIdentity, identity_from
 from .console import DriveConsole
 from .drive import DriveSession
 from .fleet import Fleet
 from .journal import Entry, Journal
-from .read.reader import Reader
+from .reading import Origin, Reading
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 
 EXACT_LEAD = 60.0
 """Seconds before the time of a replay that pass as they were."""
 MONITORED_IN_LEAD = 4
 """Drives whose curves begin before the time of a replay, if none is open."""
+LEAD_TAKES, EXACT_TAKES = 0.5, 1.5
+"""Seconds of processor time for both; a line with many drives then has gaps in its curves."""
 LEAD_SLEEP = 5.0
 """Seconds of each sleep in those before; more with many drives."""
 OTHER_PROFILE = (
@@ -115,14 +117,16 @@ def _means(profile: Profile) -> dict[tuple[int, int], bool]:
     return found
 
 
-async def _take_known(line: ReplayLine, session: DriveSession) -> None:
+def _take_known(line: ReplayLine, session: DriveSession) -> None:
     """Have a session know all that was read of its drive by now, by any program."""
-    known, reader = line.known_registers(session.device), Reader(session)
+    found = {}
     for parameter in session.profile.data.parameters:
-        places = range(parameter.address, parameter.address + word_count(parameter))
-        if all((parameter.function, register) in known for register in places):
-            with suppress(LineError, DriveError):
-                await reader.read([parameter.code], priority=Priority.POLL)
+        place = parameter.function, parameter.address, word_count(parameter)
+        with suppress(LineError):
+            reply = line.newest_reply(session.device, *place)
+            raw = from_words(parameter, reply.words)
+            found[parameter.code] = Reading.undecoded(parameter, raw, reply.time, Origin.POLL)
+    session.take(found)
 
 
 async def pass_lead(
@@ -140,19 +144,19 @@ async def pass_lead(
     exact = line.in_step(device, max(clock.monotonic(), line.at - EXACT_LEAD), period)
     if clock.monotonic() < exact:
         clock.least_sleep = max(LEAD_SLEEP, float(len(drives)))
-        await line.run_to(exact)
+        await line.run_to(exact, LEAD_TAKES)
         clock.least_sleep = 0.0
     for console in drives:
-        await _take_known(line, console.session)
+        await asyncio.to_thread(_take_known, line, console.session)
     shown = [console for console in drives if device in (None, console.device)]
     for console in shown[:MONITORED_IN_LEAD]:
         monitor(console)
-    await line.run_to(line.at)
+    await line.run_to(line.at, EXACT_TAKES)
     for console in shown[:MONITORED_IN_LEAD]:
         if device is None:
             console.monitor.stop()
         else:
             monitor(console)  # reads all values of this time, also those of the slow rate
     for console in drives:  # what was not read at the begin may have been read since
-        await _take_known(line, console.session)
+        await asyncio.to_thread(_take_known, line, console.session)
         fleet.line_watch.keep(console.session, console.monitor)

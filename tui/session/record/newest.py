@@ -34,10 +34,13 @@ from .schema import (
     WRONG,
     EventRow,
     RecordDamaged,
+    ReplyRow,
 )
 
 ROWS_AHEAD = 500
 """Rows that are read in one query while a replay goes on."""
+PASSED_OVER = 120_000_000
+"""Microseconds beyond which only the newest replies are read, not those in between."""
 SOUGHT_AGAIN = 1_000_000
 """Microseconds after which the end of a file is read again: it may still be written."""
 REPEATED_WITHIN = 2_000_000
@@ -101,12 +104,6 @@ class ReplayReader(RecordReader):
         """Open a record. Raises RecordDamaged, sqlite3.Error."""
         super().__init__(path, any_thread=True)
 
-    @property
-    def line(self) -> str:
-        """The line as it was written in the record; empty if it has none."""
-        row = self._base.execute("SELECT value FROM about WHERE name = 'line'").fetchone()
-        return str(row[0]) if row else ""
-
     def devices(self) -> tuple[int, ...]:
         """Return the devices that have answered."""
         found: set[int] = set()
@@ -165,6 +162,15 @@ class ReplayReader(RecordReader):
         """Return the replies of a device that follow a time."""
         return [_reply_in(row) for row in self.following("reply", device, (at, -1))]
 
+    def exchanges_of(self, device: int, since: int, until: int) -> list[ReplyRow]:
+        """Return the exchanges of a device whose request was sent in a time."""
+        found = self._base.execute(
+            f"SELECT {', '.join(ReplyRow._fields[:-1])}, '' FROM reply"
+            " WHERE device = ? AND utc >= ? AND utc < ? ORDER BY utc",
+            (device, since, until),
+        )
+        return [ReplyRow._make(row) for row in found]
+
     def identification(self, device: int, function: int) -> IdentificationObjects | None:
         """Return what a device reported by function 43 or 17; None if that is not recorded."""
         rows = self._base.execute(
@@ -221,10 +227,9 @@ class NewestReplies:
         self._ended = ended
         self._at: int | None = None
         self._raw_since = reader.raw_since(device)
-        self.by_register: dict[tuple[int, int], RecordedReply] = {}
-        """The newest replies to reads, by function and register."""
+        self._by_register: dict[tuple[int, int], RecordedReply] = {}
         self._refused: dict[tuple[int, int, int], RecordedReply] = {}
-        self._tables = {"reply": _Following(), "reduced": _Following()}
+        self._tables: dict[str, _Following] = {}
         self.heard: int | None = None
         """When its last reply ended, in microseconds; None before the first."""
         self.failures = 0
@@ -233,13 +238,13 @@ class NewestReplies:
 
     def move(self, at: int) -> None:
         """Go to a later time in microseconds, or begin there."""
-        if self._at is None:
+        if self._at is None or at - self._at > PASSED_OVER:
             newest = self._reader.newest(self._device, self._before_repeat(at))
             for reply in sorted(newest, key=lambda reply: (reply.ended, reply.reduced)):
                 self._take(reply)
-            for following in self._tables.values():
-                following.last = at, -1
-            self._begin_before(at)
+            # exchanges that had begun by then may end later
+            begin = at - 2 * REPEATED_WITHIN
+            self._tables = {name: _Following(begin, at) for name in ("reply", "reduced")}
         self._at = at
         for table, following in self._tables.items():
             for reply, repeated in following.until(at, partial(self._read, table)):
@@ -253,12 +258,6 @@ class NewestReplies:
             if reply.ended <= at < following.ended and is_repeated(reply, following):
                 return self._before_repeat(reply.sent - 1)
         return at
-
-    def _begin_before(self, at: int) -> None:
-        """Do not lose exchanges that had begun by then and end later."""
-        for following in self._tables.values():
-            following.last = at - 2 * REPEATED_WITHIN, -1
-            following.skip = at
 
     def _read(self, table: str, last: tuple[int, int]) -> tuple[list[RecordedReply], Any]:
         rows = self._reader.following(table, self._device, last)
@@ -282,7 +281,7 @@ class NewestReplies:
             return True
         for register in range(reply.address, reply.address + reply.registers):
             place = reply.function, register
-            self.by_register[place] = _later(self.by_register.get(place), reply)
+            self._by_register[place] = _later(self._by_register.get(place), reply)
         return True
 
     def words(self, function: int, address: int, count: int) -> tuple[tuple[int, ...], int]:
@@ -291,7 +290,7 @@ class NewestReplies:
         Raises NotRecorded for registers that were not read, or not by one request.
         """
         places = range(address, address + count)
-        found = [self.by_register.get((function, register)) for register in places]
+        found = [self._by_register.get((function, register)) for register in places]
         newest = max((reply.ended for reply in found if reply is not None), default=0)
         refused = self._refused.get((function, address, count))
         if refused is not None and refused.ended >= newest:
@@ -318,9 +317,9 @@ def _later(before: RecordedReply | None, reply: RecordedReply) -> RecordedReply:
 class _Following:
     """Rows of one table in the order of their time, some read ahead."""
 
-    def __init__(self) -> None:
-        self.last: tuple[int, int] = (0, -1)
-        self.skip = 0
+    def __init__(self, begin: int, known_to: int) -> None:
+        self.last = (begin, -1)
+        self.skip = known_to
         """Time up to which replies are known already."""
         self._ahead: deque[RecordedReply] = deque()
         self._sought = 0

@@ -15,7 +15,7 @@ SPEEDS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 REPLAY_TICK = 0.02
 """Real seconds between two steps of the time."""
 STEP_TAKES = 0.02
-"""Real seconds of work in one step; with more to do, the replay is slower than its speed."""
+"""Seconds of processor time in one step; with more to do, the replay is slower than its speed."""
 WAKING_TURNS = 3
 """Turns of the loop in which the work that was woken does its part."""
 
@@ -110,8 +110,11 @@ class ReplayClock(Clock):
                     self._since = time.monotonic(), self._now
 
     async def run_to(self, target: float, takes: float = float("inf")) -> bool:
-        """Go on to a time, waking what sleeps on the way; False if it takes too many seconds."""
-        begun = time.monotonic()
+        """Go on to a time, waking what sleeps on the way; False if it takes too long.
+
+        `takes` is in seconds of processor time of this thread.
+        """
+        begun = time.thread_time()
         while (sleepers := self._due(target)) is not None:
             here = asyncio.get_running_loop()
             for sleeper in sleepers:
@@ -121,11 +124,16 @@ class ReplayClock(Clock):
                     sleeper.loop.call_soon_threadsafe(_wake, sleeper.woken)
             for _ in range(WAKING_TURNS):
                 await asyncio.sleep(0)
-            if time.monotonic() - begun > takes:
+            if time.thread_time() - begun > takes:
                 return False
         with self._lock:
             self._now = max(self._now, target)
         return True
+
+    def skip_to(self, time: float) -> None:
+        """Go on to a time; what sleeps is late."""
+        with self._lock:
+            self._now = max(self._now, time)
 
     def _due(self, target: float) -> list[_Sleeper] | None:
         """Go to the time of the next sleeper; None if none is due by a time."""

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import sqlite3
 import threading
-from collections.abc import Callable, Collection, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, TypeVar
@@ -18,13 +18,11 @@ from tui.bus.errors import (
     LineClosed,
     LineFailed,
     LineLost,
-    LinkSyntaxError,
     NoAnswer,
     RequestRefused,
 )
 from tui.bus.expectation import IDENTIFY
 from tui.bus.limits import Limits
-from tui.bus.link import Link, SerialLink, TcpLink, parse_link
 from tui.bus.model import (
     DeviceState,
     IdentificationObjects,
@@ -43,14 +41,16 @@ from tui.bus.tally import Tally
 from tui.bus.trace import Frame
 
 from .newest import MeanOf, NewestReplies, RecordedReply, ReplayReader
+from .rebuilt_frames import frames_of
 from .replay_clock import ReplayClock
+from .replay_wire import replayed_link, wire_frame
 from .schema import COPY, GOOD, REFUSED, SILENT, EventRow, RecordDamaged, to_microseconds
 
 T = TypeVar("T")
 
 REPLAY_SENDS_NOTHING = "This is a replay: nothing is sent to a drive."
-NO_HOST = "replay.invalid"
-"""A name that no host can have: the line of a replay must never be reached."""
+FRAMES_OF = 10.0
+"""Seconds of the record whose frames are listed."""
 PAUSE_OF_CYCLES = 0.1
 """Seconds without a request that end a cycle of a monitor."""
 STEP_MARGIN = 0.03
@@ -91,14 +91,15 @@ class ReplayLine:
         self.at = start
         """The time at which the replay begins, after `lead`."""
         self.clock = ReplayClock(begin, end, max(begin, start - lead))
-        self.link = _link_of(self.recorded_line)
+        self.link = replayed_link(self.recorded_line)
         self.read_only = True
         self.held = REPLAY_SENDS_NOTHING
         self.timing = Timing()
         self.pace = Pace()
         self.facts = SharedState()
         self.facts.gated = True
-        self.trace: tuple[Frame, ...] = ()
+        self._frames: tuple[float, tuple[Frame, ...]] = (0.0, ())
+        """The frames before a time."""
         self._tally = Tally(clock=self.clock.monotonic)
         self._newest: dict[int, NewestReplies] = {}
         self._lock = threading.RLock()
@@ -145,10 +146,14 @@ class ReplayLine:
             return since
         return since + (ends[-1] + STEP_MARGIN - since) % period
 
-    def known_registers(self, device: int) -> Collection[tuple[int, int]]:
-        """Return the registers that were read by now, with the function of the read."""
-        with self._lock:
-            return set(self._of(device).by_register)
+    def newest_reply(self, device: int, function: int, address: int, count: int) -> Reply:
+        """Return the registers as they were read last; raises the recorded error."""
+        try:
+            with self._lock:
+                words, ended = self._of(device).words(function, address, count)
+        except sqlite3.Error as error:
+            raise LineFailed(f"The record cannot be read: {error}.") from error
+        return Reply(words, ended / 1e6)
 
     def use_means(self, device: int, mean_of: MeanOf) -> None:
         """Set which registers of a device have a mean, for replies that were reduced."""
@@ -199,6 +204,25 @@ class ReplayLine:
             if (found := LineStatus(status)) in (LineStatus.LOST, LineStatus.CONNECTING):
                 return LineState(found, reason, last.utc / 1e6)
         return LineState(LineStatus.CONNECTED, "", last.utc / 1e6)
+
+    @property
+    def trace(self) -> tuple[Frame, ...]:
+        """The frames of the last seconds, made of the rows of the record."""
+        now = self.clock.monotonic()
+        if self._frames[0] != now:
+            span = to_microseconds(now - FRAMES_OF), to_microseconds(now)
+            try:
+                with self._lock:
+                    rows = sorted(
+                        row
+                        for device in self.devices
+                        for row in self._reader.exchanges_of(device, *span)
+                    )
+            except sqlite3.Error:
+                return ()
+            found = [wire_frame(each, self.link) for row in rows for each in frames_of(row)]
+            self._frames = now, tuple(item for item in found if item.time <= now)
+        return self._frames[1]
 
     @property
     def counters(self) -> LineCounters:
@@ -270,12 +294,7 @@ class ReplayLine:
     ) -> Reply:
         """Return the registers as they were read last; raises the recorded error."""
         self._check()
-        try:
-            with self._lock:
-                words, ended = self._of(device).words(function, address, count)
-        except sqlite3.Error as error:
-            raise LineFailed(f"The record cannot be read: {error}.") from error
-        return Reply(words, ended / 1e6)
+        return self.newest_reply(device, function, address, count)
 
     def _check(self) -> None:
         if self._closed:
@@ -336,32 +355,25 @@ class ReplayLine:
             raise LineClosed from None
         return worker
 
-    async def run_to(self, at: float) -> None:
-        """Go on to a later time, whatever the speed; for the loop of any thread."""
+    async def run_to(self, at: float, takes: float = math.inf) -> None:
+        """Go on to a later time, whatever the speed; for the loop of any thread.
+
+        If it takes more than `takes` seconds of processor time, the rest is left out.
+        """
         done: Future[object] = Future()
 
         async def run() -> None:
             try:
-                done.set_result(await self.clock.run_to(min(at, self.clock.end)))
+                end = min(at, self.clock.end)
+                if not await self.clock.run_to(end, takes):
+                    self.clock.skip_to(end)
+                done.set_result(None)
             except BaseException as error:
                 done.set_exception(error)
                 raise
 
         self.spawn(run, "replay to a time")
         await asyncio.wrap_future(done)
-
-
-def _link_of(line: str) -> Link:
-    """Return the recorded link, to plan reads as then; it leads to no port and no host."""
-    try:
-        link = parse_link(line)
-    except LinkSyntaxError:
-        return SerialLink("replay")
-    if isinstance(link, SerialLink):
-        return replace(link, path="replay")
-    if isinstance(link, TcpLink):
-        return replace(link, host=NO_HOST)
-    return replace(link, host=NO_HOST)
 
 
 __all__ = ["REPLAY_SENDS_NOTHING", "RecordDamaged", "ReplayLine"]
