@@ -27,6 +27,8 @@ OF_CURVE = re.compile(r" +\d+ s(?= │)|(?<=max) +[\d.]+|(?<=min) +[\d.]+")
 ANSWERS = re.compile(r"Answers +(\d+)/(\d+)")
 NOW = re.compile(r"[\d.]+(?= \w+$)", re.MULTILINE)
 """Present values of Faults: live ones are of the last cycle, though another read may be newer."""
+SMALL_CURVE = re.compile(r" *\d* *[┤│└├].*$", re.MULTILINE)
+"""Curve of Faults: its first second is not regular either."""
 CYCLE = 0.5
 SETTLED = 0.15
 """Seconds after the end of a cycle: that of a replay ends a moment later than the recorded one."""
@@ -148,7 +150,7 @@ def deadline(item: Seen) -> float:
 def without_keys(texts: dict[str, str]) -> dict[str, str]:
     """Texts without counts, and the part of Faults that says what a key does: it is refused."""
     return {
-        place: NOW.sub("now", text.partition("  x      ")[0])
+        place: NOW.sub("now", SMALL_CURVE.sub("", text.partition("  x      ")[0]))
         if place == "doctor"
         else ANSWERS.sub("", text)
         for place, text in texts.items()
