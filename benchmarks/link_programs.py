@@ -54,9 +54,9 @@ def both(shown: Shown, other: Shown) -> Shown:
     return lambda text: shown(text) and other(text)
 
 
-def tabs(text: str) -> object:
-    """The line of the tabs; the active one has more space around it."""
-    return text.split("\n")[1]
+def below_tabs(text: str) -> object:
+    """The first line below the tabs, which differs between screens; the tabs differ in color."""
+    return text.split("\n")[2]
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,10 +95,10 @@ _FRAMES_SHOWN = both(saying_all("Frames on the line", r"h pause .* q quit"), _MO
 _MESSAGES_SHOWN = both(saying_all("Messages ─", r"Esc back .* q quit"), _MONITOR_GONE)
 PANEL_KEYS = (
     Press("Tab", "\t", word_sign),
-    Press("7 Frames", "7", tabs, becoming(_FRAMES_SHOWN)),
-    Press("2 Monitor", "2", tabs, becoming(_MONITOR_SHOWN)),
-    Press("m Messages", "m", tabs, becoming(_MESSAGES_SHOWN)),
-    Press("2 Monitor", "2", tabs, becoming(_MONITOR_SHOWN)),
+    Press("7 Frames", "7", below_tabs, becoming(_FRAMES_SHOWN)),
+    Press("2 Monitor", "2", below_tabs, becoming(_MONITOR_SHOWN)),
+    Press("m Messages", "m", below_tabs, becoming(_MESSAGES_SHOWN)),
+    Press("2 Monitor", "2", below_tabs, becoming(_MONITOR_SHOWN)),
 )
 """A walk that ends where it began; figures of the same name are put together."""
 HELLO_KEYS = (Press("w", "w", lambda text: tuple(t in text for t in TEXTS), other_text),)
