@@ -103,7 +103,8 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
 }  # fmt: skip
 """By name: exit status, words, and the forms of the documents. FOLDER is that of the fixture."""
 ELSEWHERE = {
-    "RunDocument", "HoldDocument", "ProveDocument", "AcceptDocument", "SimulationReady",
+    "RunDocument", "HoldDocument", "ProveDocument", "AcceptDocument", "RecipesDocument",
+    "SimulationReady",
     "InputsDocument", "BenchDocument", "BenchWaitsDocument", "BenchRefusedDocument",
     "GhostDocument",
     "ServeReady", "PublishReady", "ScanSlowDocument", "ScanUnclearDocument", "PortDocument",

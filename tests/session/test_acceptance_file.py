@@ -157,10 +157,10 @@ def test_profile_that_does_not_exist_is_reported(tmp_path: Path) -> None:
 
 def test_set_of_another_family_is_refused(tmp_path: Path) -> None:
     (tmp_path / "set.toml").write_text(
-        '[parameter_set]\nformat = 1\nprofile = "atv71"\nparameters = 0\n\n[end]\nparameters = 0\n'
+        '[set]\nformat = 1\nprofile = "atv71"\nparameters = 0\n\n[end]\nparameters = 0\n'
     )
     (found,) = faults(tmp_path, step('kind = "settings"\nfile = "set.toml"'))
-    assert "7: step 1, file: " in found
+    assert found == "7: step 1, file: set.toml is a set of atv71, not of atv312."
 
 
 @pytest.mark.parametrize("content", [b"a = ", b"\xff", b"x = [[[["])

@@ -57,6 +57,8 @@ def compare(
 ) -> None:
     """Compare the settings of A and B: each a FILE, a LINE, or `factory`.
 
+    If A is a file of recipes, each drive of the line B is compared with its own recipe.
+
     A FILE may be `-`: standard input.
 
     Measurements, counters and command words are not settings. A comparison with the factory omits
@@ -66,10 +68,20 @@ def compare(
     from tui.drive.settings.compare import compare_settings as rows_of
     from tui.drive.settings.compare import factory_side, side_of
     from tui.drive.settings.compare import rows_text as table
+    from tui.drive.settings.recipes import is_recipe_file
 
     from ..documents.setting_documents import CompareDocument
+    from ..running.recipe_comparison import compare_with_recipes
     from ..shared.output import print_json
 
+    if is_recipe_file(Path(a)):
+        if profile_id is not None:
+            raise click.UsageError("The profiles are in the file of recipes: omit -p.")
+        status = compare_with_recipes(
+            Path(a), _target(b, None, None).line_text, devices, format_, _row_field,
+            all_rows=all_rows, as_json=as_json,
+        )  # fmt: skip
+        raise click.exceptions.Exit(status)
     if len(devices) > 2:
         raise click.UsageError("-d is given once, or once for A and once for B.")
     places = devices or (None,)

@@ -69,6 +69,29 @@ class CompareDocument(Document, kw_only=True):
     rows: list[ComparedSettingField]
 
 
+class RecipeDriveField(DocumentPart):
+    """A drive compared with its recipe."""
+
+    device: int
+    profile: str
+    settings: int
+    """Number of settings in the recipe."""
+    differs: int | None
+    """Number that differ; null if the drive was not compared."""
+    error: str | None
+    rows: list[ComparedSettingField]
+
+
+class RecipesDocument(Document, kw_only=True):
+    """`compare` with a recipe file: each drive; rows that differ, all with --all."""
+
+    command: Literal["compare"] = "compare"
+    file: str
+    line: str
+    equal: bool
+    drives: list[RecipeDriveField]
+
+
 class SlotField(DocumentPart):
     """One slot of a block."""
 

@@ -1,0 +1,108 @@
+"""`drivepanel compare` of a whole line with its recipes."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from .commands import ended, refused, run, tcp_line
+from .printed import forms_of
+
+SET = """[set]
+format = 1
+profile = "{profile}"
+parameters = {count}
+
+[parameters.x]
+{rows}
+
+[end]
+parameters = {count}
+"""
+LIST = """format = 1
+
+[[recipes]]
+device = 4
+profile = "atv312"
+machine = "pumps.toml"
+drive = "pump-4.toml"
+
+[[recipes]]
+device = 5
+profile = "atv312"
+machine = "pumps.toml"
+ignore = ["dEC"]
+"""
+
+
+def written(path: Path, profile: str = "atv312", **raws: int) -> None:
+    rows = "\n".join(f"{code} = {{ raw = {raw} }}" for code, raw in raws.items())
+    path.write_text(SET.format(profile=profile, rows=rows, count=len(raws)), "utf-8")
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    written(tmp_path / "pumps.toml", ACC=40, dEC=50, HSP=500, Add=9, Inr=1)
+    written(tmp_path / "pump-4.toml", dEC=30)
+    path = tmp_path / "hall2.toml"
+    path.write_text(LIST, "utf-8")
+    return path
+
+
+@pytest.mark.parametrize("as_json", [False, True])
+def test_each_drive_is_compared_with_its_own_recipe(as_json: bool, file: Path) -> None:
+    sets = ("4:ACC=40", "4:dEC=30", "5:ACC=30", "5:HSP=450")
+    options = [word for text in sets for word in ("--set", text)]
+    with tcp_line("atv312@4", "atv312@5", *options, "--any-settings") as line:
+        if as_json:
+            done = ended(1, "compare", file, line, "--json")
+            assert forms_of(done.stdout) == {"RecipesDocument"}
+            document = json.loads(done.stdout)
+            assert not document["equal"]
+            assert [each["differs"] for each in document["drives"]] == [0, 2]
+            assert [row["code"] for row in document["drives"][1]["rows"]] == ["HSP", "ACC"]
+            return
+        output = run(1, "compare", file, line)
+        assert "Drive 4: as its recipe of 5 settings." in output
+        assert "Drive 5: differs in 2." in output
+        assert "Add" not in output, "the address belongs to the line"
+        assert run(0, "compare", file, line, "-d", "4").startswith("Drive 4: as its recipe")
+
+
+def test_drive_that_does_not_answer_hinders_no_other(file: Path) -> None:
+    with tcp_line("atv312@5", "--set", "ACC=40", "--set", "HSP=500", "--any-settings") as line:
+        done = ended(3, "compare", file, line)
+    assert "Drive 4: not compared." in done.stdout
+    assert "Drive 5: as its recipe of 5 settings." in done.stdout
+
+
+FAULTS = {
+    "twice": ("device = 5", "device = 4", "hall2.toml:9: device 4 has two recipes."),
+    "no set": ('machine = "pumps.toml"\nignore', "ignore", "hall2.toml:9: name a set: machine,"),
+    "code": ('["dEC"]', '["DEX"]', "hall2.toml:9: ignore: 'DEX' is not a parameter of Altivar"),
+    "scale": (
+        '"pumps.toml"\ndrive = "pump-4.toml"',
+        '"pump-4.toml"',
+        "hall2.toml:3: dEC depends on Inr, which is in no set",
+    ),
+    "gone": ('"pump-4.toml"', '"none.toml"', "none.toml: cannot be read"),
+    "profile": ('"atv312"', '"atv313"', "atv313"),
+    "family": ('"pump-4.toml"', '"other.toml"', "other.toml is a set of atv31, not of atv312."),
+    "key": ("machine =", "machines =", "machines"),
+    "address": ("device = 5", "device = 300", "must be <= 247, not 300"),
+}
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_fault_of_a_recipe_is_reported_with_its_line(name: str, file: Path) -> None:
+    before, after, expected = FAULTS[name]
+    written(file.parent / "other.toml", "atv31", ACC=30)
+    file.write_text(LIST.replace(before, after, 1), "utf-8")
+    assert expected in " ".join(refused(2, "compare", file, "serial:/dev/none").split())
+
+
+def test_options_that_do_not_fit_recipes_are_refused(file: Path) -> None:
+    assert "omit -p" in refused(2, "compare", file, "sim:atv312", "-p", "atv312")
+    assert "no recipe for device 9" in refused(2, "compare", file, "sim:atv312", "-d", "9")
