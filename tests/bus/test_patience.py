@@ -349,3 +349,18 @@ def test_state_of_a_device_is_taken_over_from_the_owner_of_the_line() -> None:
         slow.copy(1, replace(owner.state(1), copies_within=within))
         assert (slow._settle, slow._repeated) == (0.0, 0.0)
         assert slow[1].settle == within
+
+
+def test_usual_turnaround_is_the_median_of_reads() -> None:
+    made = devices()
+    assert made.state(1).usual_turnaround is None
+    assert made.state(1).turnaround is None
+    for turnaround in (0.25, 0.125, 1.0):
+        made.answered(1, ONE, turnaround, 10.0)
+    write = WriteOne(1, 1, 7).expectation()
+    made.answered(1, write, 0.5, 11.0)
+    found = made.state(1)
+    assert (found.usual_turnaround, found.turnaround) == (0.25, 0.5)
+    copied = devices()
+    copied.copy(1, found)
+    assert copied.state(1).usual_turnaround == 0.25

@@ -10,17 +10,25 @@ from typing import Any, cast
 import pytest
 
 from tui.bus.api import LineStatus, Priority
-from tui.bus.errors import LineFailed, LineLost, NoAnswer
+from tui.bus.errors import (
+    DeviceException,
+    LineError,
+    LineFailed,
+    LineLost,
+    NoAnswer,
+    RequestRefused,
+)
 from tui.bus.requests import Read, WriteOne
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
+from tui.safety import STOP_TRIES
 from tui.session.clock import Clock
 from tui.session.command import stop as stops
 from tui.session.command.last_stop import LastStop, end_work
 from tui.session.command.motor_stop import FirstWave, MotorStop, with_other_way
 from tui.session.command.stop import Stopper
-from tui.session.command.stop_report import OVER, Phase, StopReport
+from tui.session.command.stop_report import OVER, Phase, StopReport, not_stopped
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog
 from tui.session.journal import Journal
@@ -654,3 +662,64 @@ def test_progress_names_the_way_that_the_drive_lacks(
     wanted: OrderId, order: OrderId, text: str
 ) -> None:
     assert with_other_way("on", wanted, order) == text
+
+
+class Tried:
+    """A stop whose attempts end as a test says."""
+
+    def __init__(self, *ends: str | Exception | None) -> None:
+        self.session: Any = SimpleNamespace(device=1)
+        self.ordered, self.taken, self.over, self.tries = 990.0, True, False, 0
+        self.ends = ends
+
+    async def carry_out(self) -> str | None:
+        end = self.ends[min(self.tries, len(self.ends) - 1)]
+        self.tries += 1
+        if isinstance(end, Exception):
+            raise end
+        return end
+
+
+REFUSED, SILENT = DeviceException(1, 6, COMMAND, 4), NoAnswer(1, 6, COMMAND)
+
+
+@pytest.mark.parametrize(
+    ("ends", "tries", "why"),
+    [
+        ((None,), 1, ""),
+        (("it turns.", None), 2, ""),
+        ((SILENT, None), 2, ""),
+        ((REFUSED, None), 2, ""),
+        ((OrderRefused("no way"), None), 2, ""),
+        ((SILENT,), STOP_TRIES, str(SILENT)),
+        ((REFUSED,), STOP_TRIES, str(REFUSED)),
+        (("it turns.",), STOP_TRIES, "it turns."),
+        ((RequestRefused("read-only"), None), 1, "read-only"),
+        ((LineError("broken"), None), 1, "broken"),
+    ],
+)
+async def test_stop_is_tried_again_unless_no_further_try_can_help(
+    ends: tuple[str | Exception | None, ...], tries: int, why: str, journal: Journal
+) -> None:
+    stopper = Stopper(Ramp(OwnTime(), 0.0), journal)
+    said: list[tuple[object, ...]] = []
+    cast(Any, stopper)._say = lambda *those: said.append(those)
+    stop = Tried(*ends)
+    await stopper._stop(cast(Any, stop))
+    assert (stop.tries, stop.over) == (tries, True)
+    assert said == ([(stop.session, Phase.FAILED, not_stopped(why), 990.0)] if why else [])
+
+
+@pytest.mark.parametrize("error", [LineLost("unplugged"), ZeroDivisionError("on purpose")])
+async def test_stop_that_fails_is_over_and_left_to_the_prepared_frames(
+    error: Exception, journal: Journal
+) -> None:
+    stopper = Stopper(Ramp(OwnTime(), 0.0), journal)
+    sent: list[tuple[object, ...]] = []
+    stopper._last = cast(
+        Any, SimpleNamespace(send=lambda *those, taken: sent.append((*those, taken)))
+    )
+    stop = Tried(error)
+    await stopper._stop(cast(Any, stop))
+    assert sent == [(stop.session, 990.0, error, True)]
+    assert (stop.tries, stop.over) == (1, True)
