@@ -702,12 +702,12 @@ async def test_stop_is_tried_again_unless_no_further_try_can_help(
     ends: tuple[str | Exception | None, ...], tries: int, why: str, journal: Journal
 ) -> None:
     stopper = Stopper(Ramp(OwnTime(), 0.0), journal)
-    said: list[tuple[object, ...]] = []
-    cast(Any, stopper)._say = lambda *those: said.append(those)
+    reported: list[tuple[object, ...]] = []
+    cast(Any, stopper)._say = lambda *those: reported.append(those)
     stop = Tried(*ends)
     await stopper._stop(cast(Any, stop))
     assert (stop.tries, stop.over) == (tries, True)
-    assert said == ([(stop.session, Phase.FAILED, not_stopped(why), 990.0)] if why else [])
+    assert reported == ([(stop.session, Phase.FAILED, not_stopped(why), 990.0)] if why else [])
 
 
 @pytest.mark.parametrize("error", [LineLost("unplugged"), ZeroDivisionError("on purpose")])
