@@ -16,7 +16,11 @@ WATCHED = 4
 TREND_SECONDS = 62.0
 FAULT_CODE = "ObF"
 NO_SEARCH = ["backspace"] * 4
+MARKED = [*["left"] * 32, "M", *["right"] * 20, "M", *["left"] * 8]
 STEPS: tuple[tuple[list[str], float, str], ...] = (
+    (["8"], 5.0, ""),
+    (MARKED, 2.0, "trend"),
+    (["escape", "escape"], 0.5, ""),
     (["question_mark"], 0.5, "help"),
     (["escape", "a"], 1.0, "armed"),
     (["r", *"42"], 1.0, "run-line"),
