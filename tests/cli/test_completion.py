@@ -36,7 +36,8 @@ def completed(typed: str) -> list[str]:
 def test_commands_are_completed() -> None:
     assert completed("st") == ["status", "stop"]
     assert set(COMMANDS) <= set(completed(""))
-    assert completed("-v re") == ["read", "record", "reference", "report", "reset", "restore"]
+    found = ["read", "record", "reference", "replay", "report", "reset", "restore"]
+    assert completed("-v re") == found
 
 
 def test_completion_imports_no_command() -> None:
