@@ -14,6 +14,7 @@ from tui.drive.profile import library
 from tui.screens.keys.screens import TABBED
 from tui.session.connect.open_line import OpenLine, demo_line, open_line
 from tui.session.journal import Journal
+from tui.widgets.lines import Lines
 
 from .test_frame import Panel
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too
@@ -79,6 +80,17 @@ async def test_every_screen_and_dialog_of_a_replay_is_marked(run: Path) -> None:
             await made.until(lambda: "REPLAY" in made.shown("strip"))
             await made.pilot.press("escape")
             await made.until(lambda: not made.app.screen.is_modal)
+
+
+async def test_help_of_a_replay_promises_no_stop_of_its_drives(run: Path) -> None:
+    async with replaying(run) as made:
+        await made.pilot.press("?")
+        await made.until(lambda: made.app.screen.is_modal)
+        lines = made.app.screen.query("#help Lines").results(Lines)
+        text = " ".join("\n".join(line.plain for each in lines for line in each.lines).split())
+        assert "The drives of a replay are not there." in text
+        assert "Stop the open drive" not in text
+        assert "run forward" not in text.lower()
 
 
 async def test_values_and_time_are_those_of_the_record(run: Path) -> None:

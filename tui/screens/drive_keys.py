@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from tui.session.fleet import FoundDrive
 
 OPEN_NOW = "Drive {drive} is open: Space stops it."
+SHOWN_NOW = "Drive {drive} of the replay is shown."
 
 
 def _named(drive: FoundDrive) -> str:
@@ -62,7 +63,8 @@ class DriveKeys(Places):
             if console is None or self.fleet is not fleet or self.screen is not below:
                 return
             self._show_same_place(console)
-            self.tell(OPEN_NOW.format(drive=_named(fleet.found[console.device])))
+            text = OPEN_NOW if self.replay is None else SHOWN_NOW
+            self.tell(text.format(drive=_named(fleet.found[console.device])))
 
         named = {
             device: None if drive.console is None else _named(drive)

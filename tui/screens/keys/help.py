@@ -17,7 +17,8 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
 
 from ..frame import Framed
-from .table import screen_actions
+from .action import NOT_IN_REPLAY
+from .table import STOP_ACTIONS, screen_actions
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
     ("▶", "green", "the motor runs"),
@@ -39,6 +40,7 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
 HELP_WIDTH, BESIDE_HELP = 76, 6
 """Columns of the dialog at most, and columns of its border, margin and scroll bar."""
 SENTENCE_LINES = 6
+STOP_IN_REPLAY = "Stop all drives of the live lines. The drives of a replay are not there."
 WITHOUT_KEY = "^p"
 """The key shown for an action without a key of its own: that of the palette."""
 HELP_STYLES = {
@@ -71,14 +73,26 @@ class HelpScreen(Framed, ModalScreen[None]):
     def dialog(self) -> ComposeResult:
         """Lines that scroll if the terminal is small."""
         keys = Lines()
-        keys.show(help_lines(self._of, min(HELP_WIDTH, self.app.size.width) - BESIDE_HELP))
+        width = min(HELP_WIDTH, self.app.size.width) - BESIDE_HELP
+        keys.show(help_lines(self._of, width, replay=self.app.replay is not None))
         with VerticalScroll(id="help"):
             yield keys
 
 
-def help_lines(screen: str, width: int) -> list[Text]:
-    """Keys and signs of a screen, with their explanations in a second column."""
-    keys = [(action.shown or WITHOUT_KEY, KEY, action.help) for action in screen_actions(screen)]
+def help_lines(screen: str, width: int, *, replay: bool = False) -> list[Text]:
+    """Keys and signs of a screen, with their explanations in a second column.
+
+    Those of a `replay` promise nothing for its drives.
+    """
+    keys = [
+        (
+            action.shown or WITHOUT_KEY,
+            KEY,
+            STOP_IN_REPLAY if replay and action in STOP_ACTIONS else action.help,
+        )
+        for action in screen_actions(screen)
+        if not (replay and action.id.partition("(")[0] in NOT_IN_REPLAY)
+    ]
     signs = [(sign, HELP_STYLES[color], meaning) for sign, color, meaning in SIGNS]
     column = max(len(key) for key, _, _ in (*keys, *signs)) + 2
     title = Text(" " * column).append(f"Keys on {screen.capitalize()}", TITLE)
