@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 from rich.text import Text
 
 from tests.drive.test_channels import IDLE
 from tests.drive.test_signal_path import ATV71, LI5, LIVE
+from tui.drive.values import NOT_AVAILABLE
 from tui.safety import LOOK_IS_OLD
+from tui.screens.control import view as control_view
 from tui.screens.control.switch_view import LEAST_WIDTH, drawing, hints, written_paths
 from tui.screens.control.view import LEFT_ROWS, headed_lines, left_lines
 from tui.session.control_paths import ControlPaths
@@ -161,3 +165,30 @@ def test_head_lines_are_never_cut(width: int) -> None:
     joined = " ".join(line.plain.strip() for line in text)
     assert "end of a long trouble" in joined
     assert joined.endswith("last")
+
+
+@pytest.mark.parametrize(
+    ("has_word", "error", "read", "shown"),
+    [
+        (True, "", True, "now Modbus"), (False, "", True, NOT_AVAILABLE),
+        (True, "no answer", True, NOT_AVAILABLE), (True, "", False, NOT_AVAILABLE),
+    ],
+)  # fmt: skip
+def test_commander_is_that_of_the_channel_word_if_it_was_read(
+    has_word: bool, error: str, read: bool, shown: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    word = SimpleNamespace(code="C")
+    monkeypatch.setattr(control_view, "channel_text", lambda parameter, value: f"{value}")
+    words = {"command_channel": word} if has_word else {}
+    profile = SimpleNamespace(quantity=words.get)
+
+    def drawn(now: float, **ways: Any) -> str:
+        assert (now, ways["missing"]) == (5.0, NOT_AVAILABLE)
+        assert ways["old"]("Modbus", 3.0) == "was Modbus"
+        assert ways["current"]("") == NOT_AVAILABLE
+        return f"now {ways['current']('Modbus')}"
+
+    readings = {"C": SimpleNamespace(drawn=drawn)} if read else {}
+    latest = SimpleNamespace(error=error, readings=readings, time=5.0)
+    assert control_view._channel(cast(Any, profile), cast(Any, latest)) == shown
+    assert control_view._channel(cast(Any, profile), None) == NOT_AVAILABLE
