@@ -273,7 +273,10 @@ def main() -> None:
         console.print(f"Not measured: {gone}")
         print(json.dumps({"load_before": load, "missing": gone, "links": {}}))
         return
-    with tempfile.TemporaryDirectory() as name, telling_drive(Path(name)) as drive:
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as name,
+        telling_drive(Path(name)) as drive,
+    ):
         folder = Path(name)
         with ssh_host(folder, environment(folder)) as host:
             setup = Setup(host, drive, programs(drive.line), options)

@@ -25,7 +25,7 @@ from tui.drive.profile import library
 from tui.screens.command.control import Control
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.keys.action import CONNECTION, LISTENING, OPENING, Action
+from tui.screens.keys.action import CONNECTION, KEY_NAMES, LISTENING, OPENING, Action
 from tui.screens.keys.screens import EVERYWHERE, TABBED
 from tui.screens.keys.table import ACTIONS, elsewhere, key_meanings, keys_line
 from tui.screens.monitor.screen import order_keys
@@ -462,3 +462,9 @@ def test_unavailable_key_is_dim(raws: dict[str, int], armed: float | None) -> No
     bright = {line.plain[span.start : span.end] for span in line.spans if span.style == ATTENTION}
     assert ("x" in bright) is (faulty and armed is not None)
     assert ("r" in bright) is (armed is not None and not faulty)
+
+
+def test_keys_with_control_have_a_short_name() -> None:
+    """The palette names them at the right; Ctrl+k stood among ^s and ^p."""
+    found = {key for action in ACTIONS for key in action.keys.split(",") if key.startswith("ctrl+")}
+    assert found - {"ctrl+q"} <= KEY_NAMES.keys()  # q itself is shown

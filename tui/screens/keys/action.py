@@ -29,6 +29,8 @@ KEY_NAMES = {
     "ctrl+s": "^s",
     "ctrl+o": "^o",
     "ctrl+r": "^r",
+    "ctrl+k": "^k",
+    "ctrl+d": "^d",
     "shift+tab": "Shift+Tab",
     "pageup": "PgUp",
     "pagedown": "PgDn",
