@@ -11,7 +11,7 @@ import pytest
 from tui.bus.master import Piece
 from tui.bus.model import Priority, Timing
 from tui.bus.requests import Read, WriteMany, WriteOne
-from tui.bus.schedule.device_record import Outstanding
+from tui.bus.schedule.device_record import Outstanding, judge_guess, known_before
 from tui.bus.schedule.patience import (
     LONG_MEMORY,
     SHORT_MEMORY,
@@ -364,3 +364,71 @@ def test_usual_turnaround_is_the_median_of_reads() -> None:
     copied = devices()
     copied.copy(1, found)
     assert copied.state(1).usual_turnaround == 0.25
+
+
+# -- a frame that was taken for an earlier reply ---------------------------------------------------
+
+
+def doubted() -> Devices:
+    """Reply to a request of 10 s is late; that of 11 s was taken for it, and has none itself."""
+    made = answering()
+    made.silent(1, ONE, 10.5, 10.75, READ.pdu())
+    before = known_before(made[1], 11.0)
+    assert made.stray(piece(REPLY), 11.125) == "late"
+    made[1].guess = before
+    made.silent(1, ONE, 11.0, 11.25, READ.pdu())
+    assert made[1].lateness == 0.375
+    return made
+
+
+def due(made: Devices) -> list[float]:
+    return [late.sent for late in made[1].outstanding]
+
+
+def test_frame_was_the_reply_if_none_comes_before_that_of_a_later_request() -> None:
+    made = doubted()
+    judge_guess(made[1], 11.0, 11.5)  # that of the request itself shows nothing
+    assert due(made) == [11.0]
+    judge_guess(made[1], 11.375, 11.5)
+    assert due(made) == [10.5], "the first one may still come, for as long as before"
+    assert made[1].outstanding[0].expires == 12.5
+    assert made[1].lateness == 0.0
+    made[1].lateness = 1.0
+    judge_guess(made[1], 11.875, 12.0)
+    assert made[1].lateness == 1.0, "a guess is judged once"
+
+
+def test_earlier_reply_that_would_be_over_is_not_awaited_again() -> None:
+    made = doubted()
+    judge_guess(made[1], 12.25, 12.5)
+    assert due(made) == []
+
+
+def test_guess_was_right_if_the_own_reply_comes_too() -> None:
+    made = doubted()
+    assert made.stray(piece(REPLY), 11.3) == "late"
+    judge_guess(made[1], 11.375, 11.5)
+    assert due(made) == []
+    assert made[1].lateness == 0.375
+
+
+def test_frame_taken_for_a_copy_teaches_no_wait_if_it_was_the_reply() -> None:
+    made = answering()
+    before = known_before(made[1], 11.0)
+    assert made.stray(piece(REPLY), 11.125) == "copy"
+    assert made[1].settle == 2.0
+    made[1].guess = before
+    made.silent(1, ONE, 11.0, 11.25, READ.pdu())
+    judge_guess(made[1], 11.375, 11.5)
+    assert (made[1].settle, made[1].repeated, due(made)) == (0.0, 0.0, [])
+
+
+@pytest.mark.parametrize(("after", "kind"), [(29.5, "late"), (30.0, "copy")])
+def test_reply_of_a_frozen_drive_is_no_copy(after: float, kind: str) -> None:
+    made = answering()
+    made.silent(1, ONE, 10.5, 10.75, READ.pdu())
+    over = made[1].outstanding[0].expires
+    made.doubts(1, TWO, over)  # what is over is put aside
+    assert made.stray(piece(REPLY), over + after) == kind
+    assert made[1].lateness == 0.0
+    assert (made[1].settle == 0.0) is (kind == "late")

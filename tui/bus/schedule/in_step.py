@@ -14,6 +14,7 @@ from ..expectation import EXCEPTION, IDENTIFY, REPORT_ID, Expectation
 from ..master import ExchangeResult, Master, MonotonicClock, Piece, ResultKind, Sending
 from ..model import Priority, Timing
 from ..requests import Diagnose, Read, Request
+from .device_record import judge_guess
 from .outcomes import Outcomes
 from .patience import Devices
 from .probes import LOOKED_BACK, Probes, may_be_silent
@@ -172,8 +173,8 @@ class InStep:
         """Note the end of an exchange, of a job or of a probe for it, maybe with a number."""
         device, now = job.request.device, self._clock()
         before = self._probes.sent(device)
-        proves = number or (bool(before) and expectation not in before)
-        proves = proves or (device in self._weak and expectation != before[-1])
+        certain = number or (bool(before) and expectation not in before)
+        proves = certain or (device in self._weak and expectation != before[-1])
         self._weak.discard(device)
         self._missed.clear() if self._gateway else self._missed.pop(device, None)
         if result.kind is ResultKind.NOTHING and expectation == job.expectation:
@@ -188,6 +189,8 @@ class InStep:
             if device in self._probes.silent:
                 self._probes.forms.note_silence(device)
         self._probes.silent.discard(device)
+        if replied and certain and not result.strays and not self._gateway:
+            judge_guess(self._devices[device], result.sent, now)
         if replied and proves:
             self._proved.add(device)
             self._next_check = now + max(CHECK_EVERY, (now - result.sent) / CHECK_SHARE)

@@ -27,6 +27,7 @@ from ..requests import BROADCAST
 from ..shared_state import SharedState
 from ..tally import Tally
 from ..written import DeviceWritten
+from .device_record import known_before
 from .patience import Devices
 from .queue import Job
 from .shared_values import SharedValues
@@ -109,9 +110,11 @@ class Outcomes:
             self._devices.answered(
                 request.device, job.expectation, result.turnaround, now, exchanged, refused=refused
             )
+        before = known_before(self._devices[request.device], result.sent)
         unexplained = self.note_strays(result.strays, result.end)
         if result.kind is ResultKind.WRONG and result.strays and request.device not in unexplained:
             result.kind = ResultKind.NOTHING
+            self._devices[request.device].guess = before
         match result.kind:
             case ResultKind.REPLY:
                 reply = job.reply(result.pdu, self._time_of(job, result))

@@ -163,8 +163,13 @@ class Devices:
 
     def _still_outstanding(self, device: int, now: float) -> list[Outstanding]:
         record = self[device]
-        record.outstanding = [late for late in record.outstanding if late.expires > now]
-        return record.outstanding
+        due = [late for late in record.outstanding if late.expires > now]
+        if len(due) != len(record.outstanding):
+            record.missed += (
+                late for late in record.outstanding if late.expires <= now and not late.copy
+            )
+        record.outstanding = due
+        return due
 
     def is_repeat(self, device: int, pdu: bytes, reply: bytes, turnaround: float) -> bool:
         """Return True if a reply is more likely a copy of one before than that of this request.
@@ -270,6 +275,12 @@ class Devices:
                     self._note_copy(record, now - late.sent, now)
                     return "copy"
                 self._note_late(record, late, now)
+                return "late"
+        for late in record.missed:
+            refused = piece.pdu[0] == late.expectation.function | EXCEPTION
+            if now - late.expires < SHORT_MEMORY and (refused or late.expectation.fits(piece.pdu)):
+                # of a drive that was frozen: it says nothing of how long replies usually take
+                record.missed.remove(late)
                 return "late"
         if record.last is not None and record.last.fits(piece.pdu):
             self._note_copy(record, now - record.last_time, now)
