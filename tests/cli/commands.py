@@ -47,9 +47,10 @@ def tcp_line(*arguments: str) -> Iterator[str]:
             yield f"tcp:{host}:{port}"
 
 
-def invoked(*arguments: str | Path) -> Result:
-    """Run a command in this process, as the program itself would."""
-    return CliRunner().invoke(main, [str(a) for a in arguments], prog_name="drivepanel")
+def invoked(*arguments: str | Path, typed: str | None = None) -> Result:
+    """Run a command in this process, as the program itself would; `typed` is its input."""
+    words = [str(argument) for argument in arguments]
+    return CliRunner().invoke(main, words, typed, prog_name="drivepanel")
 
 
 def ended(status: int, *arguments: str | Path) -> Result:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from contextlib import nullcontext
 from pathlib import Path
@@ -10,12 +11,15 @@ from types import SimpleNamespace
 import pytest
 
 from tui.cli.running import asking, keyboard
+from tui.simulator import DriveSpec, Simulation
 
 from .commands import ended, refused, run, tcp_line
 from .printed import forms_of
 
 HEAD = 'format = 1\nname = "T"\nprofile = "atv312"\n'
 STILL = '\n[[steps]]\nkind = "refused"\nreferences = ["60Hz"]\n'
+OCF = 9
+"""Number of a fault of the Altivar 312."""
 MOVING = '\n[[steps]]\nkind = "direction"\nhz = 10\nseconds = 2\n'
 
 
@@ -101,8 +105,32 @@ def test_running_motor_is_refused(file: Path, monkeypatch: pytest.MonkeyPatch) -
     questions = person(monkeypatch, "y")
     with tcp_line("atv312@1", "--run", "20", "--any-settings") as line:
         output = ended(5, "accept", file, line, "--arm", "--json").stderr
-    assert len(questions) == 1
+    assert questions == []
     assert "Not tested: device 1 is running forward. Stop it first." in output
+
+
+@pytest.mark.parametrize("late", [False, True])
+def test_drive_in_fault_is_not_tested(
+    late: bool, file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with Simulation([DriveSpec("atv312", 1)]) as simulation:
+        host, port = simulation.serve_tcp()
+        questions = person(monkeypatch, "y")
+
+        async def trips(question: str) -> str:
+            questions.append(question)
+            simulation.drive(1).provoke(OCF)
+            await asyncio.sleep(1.0)
+            return "y"
+
+        if late:
+            monkeypatch.setattr(asking, "typed_answer", trips)
+        else:
+            simulation.drive(1).provoke(OCF)
+        line = f"tcp:{host}:{port}"
+        output = ended(5, "accept", file, line, "--arm", "--json").stderr
+    assert len(questions) == late, "a fault is not asked about"
+    assert f"is in fault. Clear its cause, then: drivepanel reset {line} -d 1 --arm" in output
 
 
 def test_refusal_writes_no_folder(

@@ -104,7 +104,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
 """By name: exit status, words, and the forms of the documents. FOLDER is that of the fixture."""
 ELSEWHERE = {
     "RunDocument", "HoldDocument", "ProveDocument", "AcceptDocument", "RecipesDocument",
-    "SimulationReady",
+    "ExportDocument", "SimulationReady",
     "InputsDocument", "BenchDocument", "BenchWaitsDocument", "BenchRefusedDocument",
     "GhostDocument",
     "ServeReady", "PublishReady", "ScanSlowDocument", "ScanUnclearDocument", "PortDocument",
@@ -271,6 +271,7 @@ def test_every_command_has_json() -> None:
         "hold",
         "prove",
         "accept",
+        "export",
     }
     assert tried == set(COMMANDS) - NO_JSON
     for name in tried:

@@ -123,7 +123,7 @@ def test_split_writes_a_file_for_each_part_of_the_time(
     records.write(folder, rows, name=name)
     records.write(folder, [records.row(7300, CURRENT, 30)], name=name, day=DAY + 1)
     printed = run(0, "export", LINE, "LCR", "--split", split, "--out", tmp_path / "v.csv", "--json")
-    forms_of(printed)
+    assert forms_of(printed) == {"ExportDocument"}
     files = json.loads(printed)["files"]
     assert {Path(item["file"]).name for item in files} == names
     for item in files:

@@ -9,7 +9,6 @@ import os
 import re
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -18,6 +17,7 @@ from typing import Any
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE
+from tests.sources import ROOT
 from tests.sweeps import kept
 from tui.bus.errors import LineLost
 from tui.cli.shared.say import Messages
@@ -434,27 +434,27 @@ def test_steps_left_after_a_write_are_reported(
     assert all(part in text for part, text in zip(parts, messages.texts, strict=True))
 
 
-def test_dash_is_standard_output_and_standard_input(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_dash_is_standard_output_and_standard_input() -> None:
     line = "sim:atv71@2"
     text = run(0, "backup", line, "-", "-d", "2")
     assert f'line = "{line}"' in text
     assert "settings of" not in text
 
-    def supply(data: str) -> None:
+    def given(status: int, data: str, *words: str) -> str:
         supplied.clear()
-        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(data.encode())))
+        done = invoked(*words, typed=data)
+        assert done.exit_code == status, done.output
+        return done.output
 
-    supply(text)
-    assert "529 equal already" in run(0, "restore", line, "-", "--dry-run", "-d", "2")
-    supply(text)
-    assert "No setting differs" in run(0, "compare", line, "-", "-d", "2")
-    supply("[set]\nformat")
-    assert "drivepanel: -:2: " in refused(2, "restore", line, "-", "--dry-run", "-d", "2")
-    supply(Path("profiles/atv21.toml").read_text("utf-8"))
-    assert "-: Altivar 21, 207 parameters, no fault found." in run(0, "profiles", "--check", "-")
+    restore = "restore", line, "-", "--dry-run", "-d", "2"
+    assert "529 equal already" in given(0, text, *restore)
+    assert "No setting differs" in given(0, text, "compare", line, "-", "-d", "2")
+    assert "drivepanel: -:2: " in given(2, "[set]\nformat", *restore)
+    profile = (ROOT / "profiles/atv21.toml").read_text("utf-8")
+    checked = given(0, profile, "profiles", "--check", "-")
+    assert "-: Altivar 21, 207 parameters, no fault found." in checked
     blocks = run(0, "block", line, "save", "-", "-d", "2")
-    supply(blocks)
-    run(0, "block", line, "load", "-", "--dry-run", "-d", "2")
+    given(0, blocks, "block", line, "load", "-", "--dry-run", "-d", "2")
     assert run(0, "report", line, "-", "-d", "2").startswith(f"# Altivar 71 at {line}, address 2\n")
     for command in ("backup", "report"):
         assert "both write to standard output" in refused(2, command, line, "-", "--json")

@@ -25,6 +25,8 @@ from tui.session.drive import DriveSession
 from .fake_clock import FakeClock
 
 OWN_TIME = {
+    "acceptance/acceptance_run.py",
+    "acceptance/motion.py",
     "clock.py",
     "journal.py",
     "journal_file.py",
@@ -35,6 +37,7 @@ OWN_TIME = {
     "running/motor_run.py",
     "running/watching.py",
     "record/record_file.py",
+    "record/replay_clock.py",
     "record/recorder.py",
     "record/ring.py",
     "connect/recorded_line.py",
@@ -42,7 +45,8 @@ OWN_TIME = {
     "sharing/stop_others.py",
 }
 """Modules that use the real clock: the threads of the journal and of the recorder, times that are
-recorded, threads that wait for a stop, and programs that wait for the motor that they run.
+recorded, the clock of a replay, threads that wait for a stop, and programs that wait for the motor
+that they run.
 """
 SESSION = Path(tui.session.__file__).parent
 

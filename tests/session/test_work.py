@@ -528,12 +528,13 @@ def test_line_or_drive_that_cannot_be_armed_says_why(monkeypatch: pytest.MonkeyP
     assert arming.hindrance == ""
     arming.trouble = lambda: "trouble"
     assert arming.hindrance == "trouble"
-    arming.barred = "barred"
-    assert arming.hindrance == "barred"
     line.held = "held"
     assert arming.hindrance == "held"
     line.read_only = True
     assert arming.hindrance == "The line is read-only: nothing is written."
+    arming.barred = "barred"
+    assert arming.hindrance == "barred"
+    arming.barred = ""
     with pytest.raises(OrderRefused, match="read-only"):
         arming.arm()
     assert (here.heard, arming.armed, arming.times) == ([], False, 0)

@@ -29,7 +29,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.screens.status_refresher import FRAME_LOOK
 from tui.session.arming import Arming
-from tui.session.clock import REAL_CLOCK, Clock
+from tui.session.clock import Clock
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.open_line import OpenLine
 from tui.session.console import DriveConsole
@@ -272,11 +272,13 @@ def console_of(
     device: int = 2,
     family: str = "atv71",
     armed: float | None = None,
-    clock: Clock = REAL_CLOCK,
+    clock: Clock | None = None,
 ) -> DriveConsole:
     """A drive whose monitor has this snapshot, with a trend of a start and a run."""
     identity = ATV71 if family == "atv71" else None
-    session = DriveSession(StillLine(line), device, library.load(family), identity, clock=clock)
+    session = DriveSession(
+        StillLine(line), device, library.load(family), identity, clock=clock or StillClock()
+    )
     session.arming = session.work.arming = StillArming(session.line, armed)
     way = -1.0 if snapshot and snapshot.state.direction == "reverse" else 1.0
     raw = session.profile.quantity("output_frequency") is None

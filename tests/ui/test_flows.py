@@ -33,6 +33,7 @@ from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.opening import OpeningScreen
 from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.trend.screen import TrendScreen
 from tui.screens.wiring.screen import WiringScreen
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.monitor.line_watch import LineWatch
@@ -246,6 +247,7 @@ def test_every_action_has_a_method_and_a_text() -> None:
         MessagesScreen,
         WiringScreen,
         ListeningScreen,
+        TrendScreen,
     )
     owners: dict[str, type] = {(screen.TITLE or "line").lower(): screen for screen in screens}
     owners[OPENING] = OpeningScreen

@@ -7,10 +7,12 @@ from contextlib import asynccontextmanager
 from pathlib import Path
 
 import pytest
+from textual.widgets import Input
 
 from tests.session.test_replay import BEGIN, event, record, row
 from tui.app import DrivePanelApp
 from tui.drive.profile import library
+from tui.screens.dialogs.ask import Ask
 from tui.screens.keys.screens import TABBED
 from tui.session.connect.open_line import OpenLine, demo_line, open_line
 from tui.session.journal import Journal
@@ -18,6 +20,7 @@ from tui.widgets.lines import Lines
 
 from .test_frame import Panel
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too
+from .test_text_is_text import MARKUP
 
 LIVE = "sim:atv71@1"
 
@@ -193,3 +196,18 @@ async def test_live_line_beside_a_replay_is_stopped_by_its_keys(run: Path) -> No
 def newest(made: Panel) -> str:
     event = made.app.events.newest
     return event.text if event is not None else ""
+
+
+async def test_markup_is_no_time_of_a_replay(run: Path) -> None:
+    async with replaying(run) as made:
+        assert made.app.replay is not None
+        at = made.app.replay.clock.monotonic()
+        for text in MARKUP:
+            await made.pilot.press("@")
+            await made.until(lambda: isinstance(made.app.screen, Ask))
+            field = made.app.focused
+            assert isinstance(field, Input)
+            field.value = text
+            await made.pilot.press("enter", "escape")
+            await made.until(lambda: not isinstance(made.app.screen, Ask))
+        assert made.app.replay.clock.monotonic() == at

@@ -27,10 +27,12 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.pick_parameter import PickParameter
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
+from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.edit_value import EditNumber
 from tui.screens.parameters.screen import ParametersScreen
 from tui.screens.parameters.set_keys import Skipped
+from tui.screens.trend.screen import TrendScreen
 from tui.terminal.lean import cells_of
 from tui.widgets.plain import entry
 
@@ -171,6 +173,12 @@ async def faults(made: Bench) -> None:
     await made.pilot.press("7")
     await until(made.pilot, lambda: isinstance(made.app.screen, FramesScreen))
     await dialog(made, "ctrl+s")
+    await made.pilot.press("8")
+    await until(made.pilot, lambda: isinstance(made.app.screen, TrendScreen))
+    await dialog(made, "ctrl+s")
+    await made.pilot.press("m")
+    await until(made.pilot, lambda: isinstance(made.app.screen, MessagesScreen))
+    await dialog(made, "J")
 
 
 async def connection(made: Bench) -> None:
@@ -218,6 +226,9 @@ QUESTION_CLASSES = {
     "X",
     "Ctrl+S of Faults",
     "Ctrl+S of Frames",
+    "Ctrl+S of Trend",
+    "J of Messages",
+    "@ of a replay",  # in test_replay
     "n",
     "bundle of the palette",
 }

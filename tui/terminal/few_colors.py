@@ -129,7 +129,7 @@ PLAIN_SIGNS: Final = {
     **dict.fromkeys("┏┓┗┛┣┫┥", "+"),
     **dict.fromkeys("━═▔▀▄▅", "="),
     **dict.fromkeys("▁▂▃", "_"),
-    **dict.fromkeys("▆▇█▓▒░", "#"),
+    **dict.fromkeys("▆▇█▓▒░▚", "#"),
     **dict.fromkeys("→▶▸►", ">"),
     **dict.fromkeys("←◀◂", "<"),
     **dict.fromkeys("↑▲", "^"),

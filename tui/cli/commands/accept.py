@@ -247,21 +247,16 @@ class AcceptSession:
 
     async def _confirm(self, console: DriveConsole, ending: Ending, high: HighSpeed | None) -> None:
         """Show what will move; arm after a yes. Raises Failure, with nothing written."""
-        from tui.drive.chart import ENABLED_KINDS
-        from tui.session.running.watching import latest_of
-
         from ..running.asking import says_yes
         from ..running.keyboard import ended_by_typing
 
         _may_arm(console)
+        self._need_standstill(console)
         for text in plan_lines(self.test, high):
             say(text, err=True)
         if not await says_yes(f"Carry out this test on device {console.device}?"):
             raise Failure("Not confirmed. Nothing was tested.", REFUSED_HERE)
-        state = latest_of(console).state
-        if state.motion in (*ENABLED_KINDS, "unknown"):
-            text = f"Not tested: device {console.device} is {state.headline}. Stop it first."
-            raise Failure(text, REFUSED_HERE)
+        self._need_standstill(console)
         _may_arm(console)
         try:
             self.folder.mkdir(parents=True)
@@ -271,6 +266,22 @@ class AcceptSession:
         self._begun = True
         self._ending = ending
         self._stack.enter_context(ended_by_typing(ending))
+
+    def _need_standstill(self, console: DriveConsole) -> None:
+        """Raise Failure if the drive runs, is in fault, or its state is not known."""
+        from tui.drive.chart import ENABLED_KINDS
+        from tui.session.running.watching import latest_of
+
+        state = latest_of(console).state
+        if state.motion == "fault":
+            text = (
+                f"Not tested: device {console.device} is in fault. Clear its cause, then:"
+                f" drivepanel reset {self.target.line_text} -d {console.device} --arm"
+            )
+            raise Failure(text, REFUSED_HERE)
+        if state.motion in (*ENABLED_KINDS, "unknown"):
+            text = f"Not tested: device {console.device} is {state.headline}. Stop it first."
+            raise Failure(text, REFUSED_HERE)
 
     async def _ask_turned(self, question: str) -> str:
         """Ask which way the motor turned; return nothing for any answer but r and l."""

@@ -256,7 +256,7 @@ def _histories(
     for text in unknown.keys() - known:
         raise Failure(unknown[text], USAGE)
     if not known:
-        example = f"drivepanel export {wish.source} RFR LCR --out {wish.path}"
+        example = f"drivepanel export {wish.source} CODE CODE --out {wish.path}"
         raise Failure(f"Name the codes to export, for example: {example}", USAGE)
 
 

@@ -9,6 +9,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+from tui.drive.plain import plain_cells
 from tui.session.record.decoding import HistoryPoint
 from tui.session.record.history import History
 
@@ -58,7 +59,7 @@ def csv_text(traces: Sequence[BandTrace], points: Sequence[Sequence[HistoryPoint
     """Return the rows of all bands, by time; a row without a value has its reason as quality."""
     text = io.StringIO()
     table = csv.writer(text)
-    table.writerow(COLUMNS_OF_CSV)
+    table.writerow(plain_cells(COLUMNS_OF_CSV))
     rows = [
         (point.time, trace, point)
         for trace, found in zip(traces, points, strict=True)
@@ -71,7 +72,7 @@ def csv_text(traces: Sequence[BandTrace], points: Sequence[Sequence[HistoryPoint
         local = utc.astimezone().isoformat(timespec="milliseconds")
         first = utc.isoformat(timespec="milliseconds").replace("+00:00", "Z"), local
         last = point.quality, least, most, point.good, int(point.reduced)
-        table.writerow((*first, *trace.band, mean, trace.unit, *last))
+        table.writerow(plain_cells((*first, *trace.band, mean, trace.unit, *last)))
     return text.getvalue()
 
 
