@@ -75,7 +75,7 @@ def none(console: DriveConsole) -> None:
 
 PAGES: dict[str, tuple[Sequence[str], Callable[[DriveConsole], None]]] = {
     "words": ((), none),
-    "filter": (("O", *"2 error"), none),
+    "filter": (("O", *"2-error"), none),
     "found": (("j", *"acc", "enter", "enter"), none),
     "bytes": (("tab",), none),
     "lossy": (("tab", "tab"), lossy),
