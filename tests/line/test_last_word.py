@@ -146,8 +146,11 @@ def stage_a_ramp(panel: PtyPanel) -> None:
     panel.type("ACC")
     panel.shows("/ ACC")
     panel.type("\r")
-    panel.shows("+ step")
-    panel.type("+")
+    panel.shows("Enter Stage")
+    panel.settle(LINE_SETTLED)
+    panel.type("\x1b[A")
+    panel.shows("3.1")
+    panel.type("\r")
     panel.shows("1 staged")
 
 
@@ -207,8 +210,7 @@ def test_space_stops_while_a_number_is_typed(fresh_panel: PtyPanel) -> None:
     panel.type("ACC")
     panel.settle(0.3)
     panel.type("\r")
-    panel.settle(0.3)
-    panel.type("\r")
+    panel.shows("Enter Stage")
     panel.settle(0.4)
     panel.type("4x")
     panel.shows("4x")
