@@ -49,6 +49,10 @@ class Terminal:
         except AssertionError as late:
             raise AssertionError(f"{late}; the screen:\n{self.text()}") from None
 
+    def wait_for_end(self) -> None:
+        """Wait until the program in it has ended; the text of tmux about that may be missing."""
+        wait_until(lambda: self.run("list-panes", "-F", "#{pane_dead}") == "1\n", "its end")
+
     def client(self) -> int:
         """Process id of the program in it: the SSH client."""
         return int(self.run("display-message", "-p", "#{pane_pid}"))

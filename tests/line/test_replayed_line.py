@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from tests.programs import DRIVEPANEL, drivepanel, end_keepers, wait_until
+from tests.programs import DRIVEPANEL, drivepanel, end_keepers
 from tui.simulator import DriveSpec
 
 from .terminal import Terminal
@@ -35,7 +35,7 @@ def test_panel_shows_a_recorded_trip_again_and_promises_no_stop(
         live.press("q")
         live.wait_for("Quit the panel?")
         live.answer("y")
-        live.wait_for("Pane is dead")
+        live.wait_for_end()
         end_keepers()
     (path,) = record_files()
     replay = second_terminal([*DRIVEPANEL, "replay", str(path), "-d", "1"])
@@ -53,8 +53,7 @@ def test_panel_shows_a_recorded_trip_again_and_promises_no_stop(
     replay.press("5")
     replay.wait_for("REPLAY", "OVERBRAKING", "no motor to stop")
     replay.press("q")
-    # tmux may write that it is dead where nobody sees it
-    wait_until(lambda: replay.run("list-panes", "-F", "#{pane_dead}") == "1\n", "it ends")
+    replay.wait_for_end()
 
 
 def test_replay_reports_errors_before_it_opens() -> None:
