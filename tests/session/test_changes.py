@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tui.drive.profile import library
 from tui.session.changes import (
     ChangeList,
     LineLoss,
@@ -340,3 +341,62 @@ def test_every_change_has_a_text() -> None:
     loss = LostLink(3, 0, 90, "damaged reply")
     assert change_text(LineRun("x", run)).startswith("RUN until ")
     assert change_text(LineLoss("x", loss)).endswith("(90 s): damaged reply")
+
+
+FAULT, LAST_FAULT, TRIPPED_ON = 0x0238, 7121, 9
+"""A status word in fault; the word of the last fault, and the code for OCF."""
+
+
+def tripped(begin: int, end: int) -> list[ReplyRow]:
+    """A drive at standstill in fault from one second to another; the code is read a cycle later."""
+    rows = [*each_second(0, begin, READY), *each_second(begin, end, FAULT)]
+    rows += [row(second + 0.1, LAST_FAULT, 5) for second in range(begin + 1)]
+    rows += [row(second + 0.1, LAST_FAULT, TRIPPED_ON) for second in range(begin + 1, end)]
+    return [*rows, *each_second(end, end + 5, READY)]
+
+
+def test_trip_of_the_record_is_listed_without_an_entry_of_the_journal(folder: Path) -> None:
+    write(folder, tripped(20, 40))
+    assert [(item.answer, item.code, item.device) for item in found(folder).entries] == [
+        ("tripped", "OCF", 1),
+        ("reset", "OCF", 1),
+    ]
+    (trip,) = found(folder).trips
+    times = [datetime.fromisoformat(text) for text in (trip.trip.tripped, trip.trip.reset)]
+    assert [seconds(time.timestamp()) for time in times] == [20, 40]
+    since = datetime.fromtimestamp(START + 30, UTC)
+    assert [item.answer for item in found(folder, since=since).entries] == ["reset"]
+
+
+def test_trip_that_the_journal_has_noted_is_listed_once(folder: Path) -> None:
+    noted = replace(
+        entry(1), kind="fault", code="OCF", new="Overcurrent", answer="tripped",
+        why="the trip was seen", line="tcp:10.0.0.5",
+        time=datetime.fromtimestamp(START + 21, UTC).isoformat(),
+    )  # fmt: skip
+    (folder.parent / JOURNAL_NAME).write_text(json.dumps(asdict(noted)) + "\n")
+    write(folder, tripped(20, 40))
+    assert [(item.answer, item.line) for item in found(folder).entries] == [
+        ("tripped", noted.line),
+        ("reset", noted.line),
+    ]
+    (trip,) = found(folder).trips
+    assert trip.trip.reset
+
+
+def test_fault_that_was_there_first_and_last_is_seen_and_has_no_end(folder: Path) -> None:
+    write(folder, each_second(0, 5, FAULT))
+    (item,) = found(folder).entries
+    assert (item.answer, item.code, item.new) == ("seen", "", "")
+
+
+def test_fault_word_that_shows_present_faults_decides(folder: Path) -> None:
+    """The Altivar 21 has the fault in a word of its own."""
+    words = [(0, 0), (1, 0), (2, 1), (3, 1), (4, 0)]
+    address = library.load("atv21")["FC90"].address
+    write(folder, [row(at, address, word) for at, word in words] + [row(0, 64769, 0x4000)],
+          profile="atv21")  # fmt: skip
+    assert [(item.answer, item.code) for item in found(folder).entries] == [
+        ("tripped", "OC1"),
+        ("reset", "OC1"),
+    ]

@@ -145,3 +145,14 @@ def test_text_has_both_curves_with_their_ends(
     assert len(lines) == 2 + 2 * CURVE_ROWS + 1
     assert ["15 Hz" in text, "0 Hz" in text, "3 A" in text] == [True] * 3
     assert lines[-2].split() == ["22:01:35", "22:02:04"]
+
+
+def test_later_trip_of_the_record_is_the_last_one(tmp_path: Path) -> None:
+    rows = [records.row(second, SPEED, 100) for second in range(290, 420)]
+    rows += [records.status(second, READY) for second in range(290, 400)]
+    rows += [records.status(second, records.FAULT) for second in range(400, 420)]
+    rows.append(records.row(405, records.LAST_FAULT, records.TRIPPED_ON))
+    records.write(tmp_path, rows)
+    (trip,) = trends(files_of_line(tmp_path, "line-1"), TRIP)
+    assert trip.title.startswith("Trip OCF ")
+    assert trip.curve.marks == [(START + 400, "OCF")]

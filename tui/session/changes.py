@@ -1,6 +1,7 @@
-"""Changes on the lines of this computer: writes and trips of the journal, runs, lost links.
+"""Changes on the lines of this computer: writes, trips, timeout tests, runs, lost links.
 
-Writes, trips and tests come from the journal, runs and lost links from the record of each line.
+Writes and tests come from the journal, runs and lost links from the record of each line. Trips come
+from both: a program that shows no faults notes none in the journal.
 """
 
 from __future__ import annotations
@@ -10,15 +11,15 @@ from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import UTC, datetime, time, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from .connect.line_key import line_key
-from .journal import Entry, Journal, entry_time
+from .journal import RECORD_SHOWS_IT, Entry, Journal, entry_time
 from .journal_reading import DamagedLine, completed, read_journal, selected, time_of
 from .record.ring import DAMAGED_MARK, RECORD_SUFFIX, SECONDS_A_DAY, day_of_record
 
 if TYPE_CHECKING:
-    from .record.runs import LostLink, RecordedRun, RecordEvents
+    from .record.runs import LostLink, RecordedRun, RecordedTrip, RecordEvents
     from .report import Trip
 
 _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
@@ -26,6 +27,8 @@ _AGO = re.compile(r"(\d{1,9})\s*([smhdw])")
 TIME_EXAMPLES = "2h, 30m, 7d, 08:30, 2026-03-01, 2026-03-01T08:30"
 RUN_SEARCHED = 86400.0
 """Seconds before the wanted time in which the begin of a run is searched."""
+TRIP_NOTED_WITHIN = 5.0
+"""Seconds between the reading of a fault and its entry in the journal, at most."""
 _END_OF_TIME = 4e9
 """A time after all records, in seconds since 1970."""
 _EXACT = 1.0
@@ -73,13 +76,7 @@ class ChangeList:
     @property
     def in_order(self) -> list[Change]:
         """All of them, oldest first. An entry without a valid time comes after the one before."""
-        last = datetime.min.replace(tzinfo=UTC)
-        found: list[tuple[datetime, Change]] = []
-        changes: list[Change] = [*self.entries, *self.runs, *self.losses]
-        for change in changes:
-            last = time_of_change(change) or last
-            found.append((last, change))
-        return [change for _, change in sorted(found, key=lambda pair: pair[0])]
+        return _by_time([*self.entries, *self.runs, *self.losses])
 
     @property
     def trips(self) -> Iterator[DriveTrip]:
@@ -90,6 +87,18 @@ class ChangeList:
         for line, device in dict.fromkeys((entry.line, entry.device) for entry in faults):
             own = [entry for entry in faults if (entry.line, entry.device) == (line, device)]
             yield from (DriveTrip(line, device, trip) for trip in trips_of(own))
+
+
+ChangeOrEntry = TypeVar("ChangeOrEntry", Change, Entry)
+
+
+def _by_time(changes: Iterable[ChangeOrEntry]) -> list[ChangeOrEntry]:
+    last = datetime.min.replace(tzinfo=UTC)
+    found: list[tuple[datetime, ChangeOrEntry]] = []
+    for change in changes:
+        last = time_of_change(change) or last
+        found.append((last, change))
+    return [change for _, change in sorted(found, key=lambda pair: pair[0])]
 
 
 def parse_since(text: str, now: datetime) -> datetime | None:
@@ -135,6 +144,7 @@ def read_changes(
     for text, each in (("", folder), *(private or {}).items()):
         for paths in _files_by_line(each, begin - RUN_SEARCHED):
             _add_record(found, read_events(paths), text, device, keys, begin)
+    found.entries = _by_time(found.entries)
     found.runs.sort(key=lambda item: item.run.begun)
     found.losses.sort(key=lambda item: item.loss.begun)
     return found
@@ -159,25 +169,54 @@ def _add_record(
     keys: Collection[str],
     begin: float,
 ) -> None:
-    """Add the runs and lost links of one line; `text` is its name, if not that of the record."""
+    """Add what the record of one line shows; `text` is its name, if not that of the record."""
     found.unread += record.unread
     line = text or record.line
     if not record.files or (keys and line_key(line) not in keys):
         return
-    from .record.runs import lost_lines, runs_of
+    from .record.runs import history_of, lost_lines
 
     line_losses = list(lost_lines(record))
-    losses, runs = list(line_losses), []
+    losses = list(line_losses)
+    runs: list[RecordedRun] = []
+    known = [entry for entry in found.entries if entry.kind == "fault"]
+    known = [entry for entry in known if line_key(entry.line) == line_key(line)]
     for each, profile in sorted(record.profiles.items()):
         if device in (None, each):
             since = max(0.0, begin - RUN_SEARCHED)
-            own, silent = runs_of(record, each, profile, since, _END_OF_TIME)
-            runs += own
-            losses += [loss for loss in silent if not _is_within(loss, line_losses)]
+            own = history_of(record, each, profile, since, _END_OF_TIME)
+            runs += own.runs
+            losses += [loss for loss in own.losses if not _is_within(loss, line_losses)]
+            noted = [entry for entry in known if entry.device == each]
+            name = known[-1].line if known else line
+            made = [entry for trip in own.trips for entry in _trip_entries(name, trip, noted)]
+            found.entries += [entry for entry in made if _wall(entry) >= begin]
     found.runs += [LineRun(line, run) for run in runs if run.ended >= begin]
     found.losses += [
         LineLoss(line, loss) for loss in losses if loss.ended is None or loss.ended >= begin
     ]
+
+
+def _trip_entries(line: str, trip: RecordedTrip, noted: Sequence[Entry]) -> Iterator[Entry]:
+    """Yield the begin and the end of a trip as entries, unless the journal has noted them."""
+    near = TRIP_NOTED_WITHIN + (trip.within or 0.0)
+    began = "seen" if trip.within is None else "tripped"
+    for answer, wall in ((began, trip.begun), ("reset", trip.ended)):
+        if wall is None or any(
+            (entry.answer == "reset") == (answer == "reset") and abs(_wall(entry) - wall) <= near
+            for entry in noted
+        ):
+            continue
+        yield Entry(
+            entry_time(wall), line, trip.device, trip.profile, trip.code, 0, None, "",
+            trip.raw or 0, trip.name, answer, None, RECORD_SHOWS_IT, kind="fault",
+        )  # fmt: skip
+
+
+def _wall(entry: Entry) -> float:
+    """Return the time of an entry in seconds since 1970; 0 if it is not valid."""
+    when = time_of(entry)
+    return 0.0 if when is None else when.timestamp()
 
 
 def _is_within(loss: LostLink, losses: Iterable[LostLink]) -> bool:
@@ -278,7 +317,7 @@ def entry_text(entry: Entry) -> str:
     """Return an entry without its time and drive: old and new value, answer, reason."""
     match entry.kind:
         case "fault":
-            return f"FAULT {entry.code} {entry.new}: {entry.answer}"
+            return f"{f'FAULT {entry.code} {entry.new}'.rstrip()}: {entry.answer}"
         case "proof":
             return f"{entry.why}: {entry.new}  {entry.answer}"
         case "reset":

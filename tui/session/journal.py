@@ -78,6 +78,8 @@ FAULT_WHYS = {
     "reset": "the end was seen",
 }
 """Reason by the answer of a `fault` entry. Older files have `seen from here` for each."""
+RECORD_SHOWS_IT = "the record of the line shows it"
+"""Reason of a `fault` entry that is not in the journal."""
 
 
 class Journal:

@@ -20,7 +20,7 @@ from tui.drive.settings.parameter_set import ParameterSet, lacking
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, set_bits
 
-from .journal import FAULT_WHYS, Entry
+from .journal import FAULT_WHYS, RECORD_SHOWS_IT, Entry
 
 ENTRIES_SHOWN = 200
 """Most journal entries in a report; it has the latest ones."""
@@ -309,7 +309,8 @@ def trips_of(entries: Iterable[Entry]) -> list[Trip]:
                 found[-1] = replace(last, code=entry.code, name=entry.new, reset=entry.time)
             continue
         # older files say "tripped" of each fault that was there when a panel was opened
-        tripped = entry.answer == "tripped" and entry.why == FAULT_WHYS["tripped"]
+        known = entry.why in (FAULT_WHYS["tripped"], RECORD_SHOWS_IT)
+        tripped = entry.answer == "tripped" and known
         if last is not None and ongoing and not tripped:
             found[-1] = replace(last, code=entry.code, name=entry.new)
         else:

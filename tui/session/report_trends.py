@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Literal, NamedTuple
@@ -17,13 +18,13 @@ from .monitor.trend import readout_parameter
 from .record.columns import reach_of_points
 from .record.decoding import HistoryPoint
 from .record.history import History, read_history
-from .record.runs import read_events, runs_of
+from .record.runs import RecordedRun, RecordedTrip, history_of, read_events
 from .report import trips_of
 
 SECONDS_BEFORE_TRIP, SECONDS_AFTER_TRIP = 60.0, 10.0
 SECONDS_AROUND_RUN = 5.0
 RUN_SOUGHT_FOR = 7 * 86400.0
-"""Seconds before the report in which a run is searched."""
+"""Seconds before the report in which a run and a trip are searched."""
 SAME_READING = 1.0
 """Most seconds between a frequency and the current beside it."""
 TrendKind = Literal["trip", "run"]
@@ -49,36 +50,43 @@ def report_trends(
 
     `entries` are those of the drive in the journal; `now` is in seconds since 1970. It reads files.
     """
-    found = [_trip(files, device, profile, entries), _run(files, device, profile, now)]
+    shown = history_of(read_events(files), device, profile.id, now - RUN_SOUGHT_FOR, now)
+    trip = max((*_journal_trips(entries), *_seen_trips(shown.trips)), default=None)
+    found = [
+        _trip(files, device, profile, *trip) if trip else None,
+        _run(files, device, profile, shown.runs[-1]) if shown.runs else None,
+    ]
     return [trend for trend in found if trend is not None]
 
 
+def _journal_trips(entries: Iterable[Entry]) -> Iterator[tuple[float, str, str]]:
+    """Yield time, code and name of the last trip in the journal, if its time is valid."""
+    for trip in trips_of(entry for entry in entries if entry.kind == "fault")[-1:]:
+        with suppress(ValueError, OverflowError):
+            yield datetime.fromisoformat(trip.tripped).timestamp(), trip.code, trip.name
+
+
+def _seen_trips(trips: Iterable[RecordedTrip]) -> Iterator[tuple[float, str, str]]:
+    return ((trip.begun, trip.code, trip.name) for trip in trips if trip.within is not None)
+
+
 def _trip(
-    files: Sequence[Path], device: int, profile: Profile, entries: Iterable[Entry]
+    files: Sequence[Path], device: int, profile: Profile, at: float, code: str, called: str
 ) -> ReportTrend | None:
-    """Return the seconds around the last trip; None if its time is not known."""
-    trips = trips_of(entry for entry in entries if entry.kind == "fault")
-    if not trips:
-        return None
-    try:
-        at = datetime.fromisoformat(trips[-1].tripped).timestamp()
-    except (ValueError, OverflowError):
-        return None
-    name = f"{trips[-1].code} {trips[-1].name}".strip()
+    """Return the seconds around a trip."""
+    name = f"{code} {called}".strip()
     times = at - SECONDS_BEFORE_TRIP, at + SECONDS_AFTER_TRIP
     trend = _trend(files, device, profile, times)
     if trend is None:
         return None
-    trend.curve.marks.append((at, trips[-1].code or "trip"))
+    trend.curve.marks.append((at, code or "trip"))
     return trend._replace(kind="trip", title=f"Trip {name}, {_when(at)}")
 
 
-def _run(files: Sequence[Path], device: int, profile: Profile, now: float) -> ReportTrend | None:
-    """Return the last run."""
-    runs, _ = runs_of(read_events(files), device, profile.id, now - RUN_SOUGHT_FOR, now)
-    if not runs:
-        return None
-    run = runs[-1]
+def _run(
+    files: Sequence[Path], device: int, profile: Profile, run: RecordedRun
+) -> ReportTrend | None:
+    """Return a run with the seconds around it."""
     times = run.begun - SECONDS_AROUND_RUN, run.ended + SECONDS_AROUND_RUN
     trend = _trend(files, device, profile, times, reverse=run.direction == "reverse")
     if trend is None:

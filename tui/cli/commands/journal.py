@@ -87,8 +87,9 @@ def journal(
     """Show writes to drives from this computer, trips, timeout tests, runs and lost links.
 
     Each write has its time, the drive, the old and new value, the drive's reply, and the reason.
-    Runs and lost links are those that the record of a line shows: a run has its end, its reference,
-    and the program that began it. The readable entries of a damaged journal are shown, too.
+    Runs and lost links are those that the record of a line shows, trips those of the journal and of
+    the record. A run has its end, its reference, and the program that began it. The readable
+    entries of a damaged journal are shown, too.
     """
     from tui.session.changes import read_changes
     from tui.session.journal import Journal

@@ -1,4 +1,4 @@
-"""Runs of motors and lost links in a record: from the status words that were read.
+"""Runs of motors, trips and lost links in a record: from the status words that were read.
 
 A run is known as exactly as the status word was read: rows that are older than an hour give its
 times to 10 s. A shorter one may be missing there. Times are in seconds since 1970.
@@ -9,9 +9,10 @@ from __future__ import annotations
 import json
 import sqlite3
 from bisect import bisect_left
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ from tui.drive.chart import ENABLED_KINDS, state_of
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Chart, Quantity
+from tui.drive.profile.schema import Chart, Quantity, StateKind
 
 from .decoding import HistoryPoint
 from .history import History, read_history
@@ -33,6 +34,8 @@ LEAST_SILENCE = 5.0
 """Seconds without a good reply from which the link to a drive was lost."""
 LEAST_BAD = 3
 """Bad replies from which the link to a drive was lost."""
+READ_AFTER = 2.0
+"""Seconds after the last status word in which the fault word of the same cycle is read."""
 COMMANDED_BEFORE = 10.0
 """Seconds before a run in which the write that began it is searched."""
 RUN_REFERENCES: tuple[Quantity, ...] = (
@@ -65,6 +68,22 @@ class RecordedRun(NamedTuple):
     """The program that wrote the command; empty if no program on the line did."""
 
 
+class RecordedTrip(NamedTuple):
+    """A fault of a drive, from its first reading to its end."""
+
+    device: int
+    profile: str
+    raw: int | None
+    """The raw fault code; None if it was not read."""
+    code: str
+    name: str
+    begun: float
+    ended: float | None
+    """None if the drive was in fault when last read."""
+    within: float | None
+    """Seconds by which `begun` may be wrong. None: it was in fault when first read."""
+
+
 class LostLink(NamedTuple):
     """A time in which the line or a drive did not answer."""
 
@@ -76,14 +95,22 @@ class LostLink(NamedTuple):
     reason: str
 
 
+class DriveHistory(NamedTuple):
+    """Runs, trips and lost links of one drive, each part oldest first."""
+
+    runs: Sequence[RecordedRun] = ()
+    trips: Sequence[RecordedTrip] = ()
+    losses: Sequence[LostLink] = ()
+
+
 class _Span(NamedTuple):
-    """A time in which a motor was enabled."""
+    """A time in which a drive was in states of some kinds."""
 
     begun: float
     ended: float
     begin_within: float | None
     word: int
-    """The first status word with which it was enabled."""
+    """The first word of that kind."""
     commanded: float = 0.0
     """End of the last reply that showed it running, not stopping."""
     mixed: bool = False
@@ -133,17 +160,17 @@ def read_events(files: Sequence[Path]) -> RecordEvents:
     return found
 
 
-def runs_of(
+def history_of(
     line: RecordEvents, device: int, profile_id: str, since: float, until: float
-) -> tuple[list[RecordedRun], list[LostLink]]:
-    """Return the runs of a drive, and the times in which it did not answer.
+) -> DriveHistory:
+    """Return the runs and trips of a drive, and the times in which it did not answer.
 
     Nothing is found with a profile that cannot be loaded, or that has no chart.
     """
     try:
         profile = library.load(profile_id)
     except (DriveError, OSError):
-        return [], []
+        return DriveHistory()
 
     def read(code: str) -> Sequence[HistoryPoint]:
         return read_history(line.files, device, code, since, until).points
@@ -152,12 +179,52 @@ def runs_of(
     words = {code: raws[-1] for code in selecting if (raws := _raws(read(code)))}
     chart = profile.chart(words)
     if chart is None:
-        return [], []
+        return DriveHistory()
     points = read(chart.status)
-    spans = list(_spans(chart, points))
+    kinds = partial(_kind_of, chart)
+    spans = list(_spans(points, kinds, ENABLED_KINDS))
     references = _references(line.files, device, profile, spans)
     runs = [_described(line, device, profile, chart, references, span) for span in spans]
-    return runs, list(_silences(device, points))
+    faults = read(profile.data.faults.parameter)
+    trips = list(_trips(device, profile, points, kinds, faults))
+    return DriveHistory(runs, trips, list(_silences(device, points)))
+
+
+def _kind_of(chart: Chart, word: int) -> StateKind:
+    return state_of(chart, word).kind
+
+
+def _trips(
+    device: int,
+    profile: Profile,
+    points: Sequence[HistoryPoint],
+    kind_of: Callable[[int], StateKind],
+    faults: Sequence[HistoryPoint],
+) -> Iterator[RecordedTrip]:
+    """Yield the trips; `points` are those of the status word, `faults` those of the fault word.
+
+    A fault word that shows present faults decides, if it was read; else the status word does.
+    """
+    about = profile.data.faults
+
+    def kind_of_fault(word: int) -> StateKind:
+        return "ready" if word == about.none else "fault"
+
+    if not about.shows_last and any(point.least is not None for point in faults):
+        points, kind_of = faults, kind_of_fault
+    times = [point.time for point in faults]
+    for span in _spans(points, kind_of, {"fault"}):
+        until = span.ended if span.end_within is not None else span.ended + READ_AFTER
+        first = bisect_left(times, span.begun), bisect_left(times, until)
+        codes = [raw for raw in _raws(faults[slice(*first)]) if raw != about.none]
+        raw = codes[-1] if codes else None
+        found = None if raw is None else profile.fault(raw)
+        code = found.code if found else "" if raw is None else f"code {raw}"
+        ended = None if span.end_within is None else span.ended
+        name = found.name if found else ""
+        yield RecordedTrip(
+            device, profile.id, raw, code, name, span.begun, ended, span.begin_within
+        )
 
 
 def _raws(points: Iterable[HistoryPoint]) -> list[int]:
@@ -183,18 +250,22 @@ def lost_lines(line: RecordEvents) -> Iterator[LostLink]:
         yield LostLink(None, lost[0], None, lost[1])
 
 
-def _spans(chart: Chart, points: Iterable[HistoryPoint]) -> Iterator[_Span]:
-    """Yield the times in which the motor was enabled; `points` are those of the status word."""
+def _spans(
+    points: Iterable[HistoryPoint],
+    kind_of: Callable[[int], StateKind],
+    wanted: Collection[StateKind],
+) -> Iterator[_Span]:
+    """Yield the times in which a word was of a wanted kind; `points` are those of the word."""
     span: _Span | None = None
     before: HistoryPoint | None = None
     for point in points:
         if point.least is None or point.most is None:
             continue
         words = int(point.least), int(point.most)
-        kinds = {state_of(chart, word).kind for word in words} - {"unknown"}
+        kinds = {kind_of(word) for word in words} - {"unknown"}
         if not kinds:
             continue
-        runs, rests = bool(kinds & ENABLED_KINDS), bool(kinds - ENABLED_KINDS)
+        runs, rests = bool(kinds & set(wanted)), bool(kinds - set(wanted))
         if before is not None and point.time - before.end > UNREAD_FOR:
             if span is not None:
                 yield span
@@ -203,7 +274,7 @@ def _spans(chart: Chart, points: Iterable[HistoryPoint]) -> Iterator[_Span]:
             if span is None:
                 first = point.end if rests else point.time
                 within = None if before is None else first - before.end
-                enabled = [word for word in words if state_of(chart, word).kind in ENABLED_KINDS]
+                enabled = [word for word in words if kind_of(word) in wanted]
                 span = _Span(point.time, point.end, within, enabled[0])
             commanded = point.end if "running" in kinds else span.commanded
             span = span._replace(ended=point.end, commanded=commanded, mixed=rests)
