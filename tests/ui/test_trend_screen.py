@@ -14,14 +14,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tui.screens.trend.event_list import trend_events
 from tui.screens.trend.page import TREND_STEPS, TrendPage
 from tui.screens.trend.screen import TrendScreen
 from tui.screens.trend.traces import compacted, mark_values, value_at
 from tui.screens.trend.view import samples_of_points, scale_for, trend_room
+from tui.session.events import Event
 from tui.session.fleet import FoundDrive
 from tui.session.monitor.trend_bands import TrendBand, stored_bands
 from tui.session.record.decoding import HistoryPoint
 from tui.session.record.history import History
+from tui.session.record.schema import EventRow
 from tui.widgets.lines import Lines
 
 from . import fakes
@@ -281,3 +284,18 @@ async def test_old_value_has_no_number_at_the_right(trend: Shown) -> None:
             lines = [line.plain for line in screen.query_one("#trend", Lines).lines]
             assert any(expected in line for line in lines)
             assert ("50.0" in lines[1]) is (scene == "live")
+
+
+def test_events_of_the_panel_itself_are_not_among_those_of_the_drives() -> None:
+    recorded = [
+        EventRow(1_000_000, 0, None, "line", "lost"),
+        EventRow(2_000_000, 0, 3, "stop", "x"),
+    ]
+    present = [
+        Event(4.0, None, "alarm", "The journal cannot be written."),
+        Event(5.0, None, "done", "Saved 1 value."),
+        Event(6.0, 2, "done", "Run forward"),
+        Event(7.0, None, "stop", "Stop all: Space"),
+    ]
+    found = trend_events(recorded, present, frozenset({2}))
+    assert [event.wall for event in found] == [7.0, 6.0, 1.0]

@@ -28,6 +28,8 @@ TREND_EVENT_SIGNS: dict[str, tuple[str, str, Style]] = {
     "abandoned": ("×", "x", ALARM),
 }
 """Kinds of events that are shown, with the sign, the one in ASCII, and its style."""
+EVENTS_OF_NO_DRIVE = ("stop", "line", "commander", "clock", "lost")
+"""Kinds that may concern the whole line; others without a drive are about the panel itself."""
 SAME_EVENT_WITHIN = 2.0
 """Seconds in which equal messages are about the same event."""
 
@@ -50,9 +52,8 @@ def trend_events(
     kept: list[TrendEvent] = []
     last: dict[tuple[str, str], float] = {}
     for event in sorted(found, key=lambda item: -item.wall):
-        if event.kind not in TREND_EVENT_SIGNS or (
-            event.device is not None and event.device not in devices
-        ):
+        own = event.kind in EVENTS_OF_NO_DRIVE if event.device is None else event.device in devices
+        if event.kind not in TREND_EVENT_SIGNS or not own:
             continue
         same = event.kind, event.text
         if same in last and last[same] - event.wall < SAME_EVENT_WITHIN:
