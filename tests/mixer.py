@@ -19,6 +19,17 @@ PERCENT = 'unit = "%"\nscale = "0.1"'
 PERCENT_OF_FULL = PERCENT + '\nrating = "FULL"'
 VOLTS = 'unit = "V"\nscale = "0.01"'
 FINE = 'unit = "Hz"\nscale = "0.0012207031250"'
+FULL_SCALE = 'unit = "Hz"\nfull_scale = { counts = 16384, parameter = "FULL" }'
+SIGNED = FULL_SCALE + '\ntype = "int16"\nmin = -16384\nmax = 16384'
+WIDE = 'unit = "Hz"\ntype = "int32"\nfull_scale = { counts = 200000, parameter = "FULL" }'
+WIDE_REFERENCE = 220
+"""Address of a reference of 32 bits."""
+BY_SIGN = """
+[[references]]
+parameter = "REF"
+kind = "frequency"
+reverse = "negative"
+"""
 SPEED = 'unit = "rpm"\nquantity = "command_speed"'
 
 _HEAD = """
@@ -45,6 +56,11 @@ max_read = 16
 [[functions]]
 code = 6
 name = "Write"
+
+[[functions]]
+code = 16
+name = "Write several"
+max_write = 8
 
 [[charts]]
 id = "mixer"
@@ -76,12 +92,13 @@ def mixer_text(reference: str = HERTZ) -> str:
     """Return the profile with these lines of its reference."""
     quantity = "" if "quantity" in reference else '\nquantity = "command_frequency"'
     hertz, rpm = HERTZ, 'unit = "rpm"'
+    place = WIDE_REFERENCE if "int32" in reference else REFERENCE
     rows = [
         ("STAT", 100, "r", 'quantity = "status_word"'),
         ("FREQ", 101, "r", 'type = "int16"\nquantity = "output_frequency"\n' + HERTZ),
         ("TRIP", 102, "r", 'quantity = "fault"'),
         ("CTRL", COMMAND, "rw", ""),
-        ("REF", REFERENCE, "rw", reference + quantity),
+        ("REF", place, "rw", reference + quantity),
         ("KEY", KEY, "rw", ""),
         ("MODE", MODE, "rw", ""),
         ("FULL", FULL, "rw", "factory = 500\n" + hertz),
@@ -90,7 +107,10 @@ def mixer_text(reference: str = HERTZ) -> str:
         ("FNOM", 207, "rw", 'factory = 500\nquantity = "rated_frequency"\n' + hertz),
         ("NNOM", 208, "rw", 'factory = 1450\nquantity = "rated_speed"\n' + rpm),
     ]
-    return _HEAD + "".join(_row(*row) for row in rows)
+    head = _HEAD + BY_SIGN if "min = -" in reference else _HEAD
+    if head != _HEAD:
+        head = head.replace("words = [3]", "words = [1]")
+    return head + "".join(_row(*row) for row in rows)
 
 
 def _row(code: str, address: int, access: str, more: str) -> str:

@@ -196,10 +196,43 @@ DEFECTS = (
         ),
     ),
     Defect(
+        "full-scale-ignored",
+        "tui/drive/profile/profile.py",
+        "return None if not raw else raw * Decimal(source.scale) / full.counts",
+        "return Decimal(50) / full.counts",
+        "30 Hz are written as 36 Hz if the full scale is 60 Hz.",
+        (
+            "tests/session/test_reference.py"
+            "::test_full_scale_of_another_parameter_gives_the_frequency_of_the_motor",
+        ),
+    ),
+    Defect(
+        "signed-reference-runs-forward",
+        "tui/session/command",
+        "    return with_sign(profile, wanted, reverse=reverse)",
+        "    return wanted",
+        "A motor in reverse turns forward once its reference is changed.",
+        (
+            "tests/session/test_reference.py"
+            "::test_signed_reference_turns_the_motor_in_the_commanded_direction",
+        ),
+    ),
+    Defect(
+        "start-keeps-a-foreign-sign",
+        "tui/session/command",
+        "raw = -abs(raw) if reverse else abs(raw)",
+        "pass",
+        "A start forward turns in reverse, by the sign that another program left.",
+        (
+            "tests/session/test_reference.py"
+            "::test_signed_reference_of_another_program_gets_the_sign_of_the_start",
+        ),
+    ),
+    Defect(
         "wrong-reference-started",
         "tui/session/command",
-        "if same and abs(value.number - now.number) <=",
-        "if same or abs(value.number - now.number) <=",
+        "if same and abs(value.number - expected) <=",
+        "if same or abs(value.number - expected) <=",
         "A motor starts at 200 Hz although 20 Hz were requested and the drive reads back 200.",
         ("tests/session/test_reference.py::test_start_after_the_scale_changed_is_refused",),
     ),

@@ -88,6 +88,15 @@ def path(
 
 
 Change = tuple[str, str]
+FULL_SCALE = 'unit = "{}"\nfull_scale = {{ counts = 20000, parameter = "{}" }}'
+BY_SIGN = """
+[[references]]
+parameter = "CTRL"
+kind = "frequency"
+reverse = "negative"
+
+[faults]
+"""
 
 # the change, the message, and a text of the line that it names
 FAULTS: dict[str, tuple[list[Change], str, str]] = {
@@ -376,6 +385,46 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
         [("\n[[enumerations]]", '\n[[groups]]\nname = "Pumps"\n\n[[enumerations]]')],
         "no parameter is in the group 'Pumps'",
         'name = "Pumps"',
+    ),
+    "two words written, but one at a time": (
+        [
+            ("\n[[charts]]", '\n[[functions]]\ncode = 16\nname = "Write"\n\n[[charts]]'),
+            ("\n[[enumerations]]", f"\n{WRITTEN_PAIR}\n[[enumerations]]"),
+        ],
+        "function 16 has no max_write above 1",
+        'access = "rw"\ngroup = "Monitoring"',
+    ),
+    "a full scale in another unit": (
+        [('unit = "s"\nscale = "0.01"', FULL_SCALE.format("s", "FREQ"))],
+        "full scale FREQ has the unit Hz, and its own unit is s",
+        "full_scale",
+    ),
+    "a full scale beside a scale": (
+        [('unit = "s"\nscale = "0.01"', FULL_SCALE.format("s", "TOUT") + '\nscale = "0.01"')],
+        "it has full_scale, so omit scale",
+        "full_scale",
+    ),
+    "a full scale that is none": (
+        [('unit = "s"\nscale = "0.01"', FULL_SCALE.format("s", "TOTU"))],
+        "there is no parameter 'TOTU'. Did you mean TOUT",
+        "full_scale",
+    ),
+    "a reference by its sign in an unsigned word": (
+        [("\n[faults]\n", BY_SIGN)],
+        "reference CTRL: it holds no negative value",
+        'reverse = "negative"',
+    ),
+    "a reference by its sign with two commands": (
+        [
+            ("\n[faults]\n", BY_SIGN),
+            ("address = 300\n", 'address = 300\ntype = "int16"\n'),
+            (
+                "words = [0] },\n",
+                'words = [0] },\n  { id = "reverse", name = "R", words = [3] },\n',
+            ),
+        ],
+        "the commands forward and reverse of the chart pump differ",
+        'reverse = "negative"',
     ),
     "a field that is none": (
         [("min = 10\n", "mini = 10\n")],

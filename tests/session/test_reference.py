@@ -10,14 +10,17 @@ import pytest
 from tests.mixer import (
     COMMAND,
     FINE,
+    FULL_SCALE,
     HERTZ,
     MIXER,
     PERCENT,
     PERCENT_OF_FULL,
     REFERENCE,
     SCALE_BY,
+    SIGNED,
     SPEED,
     VOLTS,
+    WIDE,
     installed_mixer,
 )
 from tui.session.work import OutcomeKind
@@ -141,6 +144,9 @@ async def test_drive_without_the_scale_word_can_start() -> None:
         (SPEED, "1500RPM", 1500, "Reference 1500 rpm (REF)"),
         (SPEED, "30Hz", 900, "Reference 900 rpm (REF) for 30 Hz"),
         (FINE, "20", 16384, "Reference 20.000 Hz (REF)"),
+        (FULL_SCALE, "25", 8192, "Reference 25.000 Hz (REF)"),
+        (FULL_SCALE, "50%", 8192, "Reference 25.000 Hz (REF) for 50 %"),
+        (FULL_SCALE, "750rpm", 8192, "Reference 25.000 Hz (REF) for 750 rpm"),
     ],
 )
 async def test_reference_in_any_unit_is_converted(
@@ -215,3 +221,86 @@ async def test_step_reaches_the_limit_in_the_unit_of_the_reference(
         made.commander.step(Decimal(5))
         await made.done()
         assert made.writes() == [(REFERENCE, raw)]
+
+
+async def test_full_scale_of_another_parameter_gives_the_frequency_of_the_motor() -> None:
+    installed_mixer(FULL_SCALE)
+    async with bench(MIXER, sets={"FULL": 600}) as made:
+        made.commander.run("forward", "30Hz")
+        await made.done()
+        assert made.writes() == [(REFERENCE, 8192), (COMMAND, 1)]
+        await made.let_go_until(lambda: abs(made.drive.motor.frequency - 30) < 0.1)
+        made.commander.step(Decimal(5))
+        assert "34.999 Hz (REF)" in await made.done()
+        assert made.writes()[-1] == (REFERENCE, 9557)
+
+
+async def test_full_scale_that_changes_before_the_start_refuses_it() -> None:
+    installed_mixer(FULL_SCALE)
+    async with bench(MIXER) as made:
+        made.commander.refer("25Hz")
+        await made.done()
+        made.drive.set("FULL", 1000)
+        text = await made.order("forward", OutcomeKind.REFUSED)
+        assert text.startswith("Not started: REF holds 50.000 Hz, 25 Hz was requested.")
+        assert made.drive.motor.frequency == 0
+
+
+async def test_full_scale_of_zero_lets_nothing_be_written() -> None:
+    installed_mixer(FULL_SCALE)
+    async with bench(MIXER, sets={"FULL": 0}) as made:
+        for give in (made.commander.refer, lambda text: made.commander.run("forward", text)):
+            give("20Hz")
+            text = await made.done(OutcomeKind.REFUSED)
+            assert "its full scale is the value of FULL, which is 0" in text
+        assert made.writes() == []
+
+
+async def test_reference_of_32_bits_turns_the_motor() -> None:
+    installed_mixer(WIDE)
+    async with bench(MIXER) as made:
+        made.commander.run("forward", "25Hz")
+        await made.done()
+        await made.let_go_until(lambda: abs(made.drive.motor.frequency - 25) < 0.1)
+
+
+async def test_signed_reference_turns_the_motor_in_the_commanded_direction() -> None:
+    installed_mixer(SIGNED)
+    async with bench(MIXER) as made:
+        made.commander.run("reverse", "25Hz")
+        await made.done()
+        assert made.writes() == [(REFERENCE, 0x10000 - 8192), (COMMAND, 1)]
+        await made.let_go_until(lambda: made.drive.motor.frequency < -24.9)
+        made.commander.refer("20Hz")
+        assert (await made.done()).startswith("Reference -20.001 Hz (REF)")
+        await made.let_go_until(lambda: abs(made.drive.motor.frequency + 20) < 0.1)
+        made.commander.step(Decimal(-5))
+        await made.done()
+        await made.let_go_until(lambda: abs(made.drive.motor.frequency + 15) < 0.1)
+        await made.order("forward")
+        await made.let_go_until(lambda: abs(made.drive.motor.frequency - 15) < 0.1)
+
+
+async def test_signed_reference_keeps_the_direction_of_a_run_at_zero() -> None:
+    installed_mixer(SIGNED)
+    async with bench(MIXER) as made:
+        made.commander.run("reverse", "0Hz")
+        await made.done()
+        made.commander.refer("25Hz")
+        await made.done()
+        assert made.writes()[-1] == (REFERENCE, 0x10000 - 8192)
+
+
+async def test_signed_reference_of_another_program_gets_the_sign_of_the_start() -> None:
+    installed_mixer(SIGNED)
+    async with bench(MIXER, sets={"REF": -8192}) as made:
+        await made.order("forward")
+        assert made.writes() == [(REFERENCE, 8192), (COMMAND, 1)]
+
+
+async def test_signed_reference_that_was_not_read_is_not_changed() -> None:
+    installed_mixer(SIGNED)
+    async with bench(MIXER, protects=frozenset({"REF"})) as made:
+        made.commander.refer("25Hz")
+        assert "its sign is the direction" in await made.done(OutcomeKind.REFUSED)
+        assert made.writes() == []

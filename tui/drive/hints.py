@@ -128,7 +128,7 @@ def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
         codes += rule.codes
     codes = [*codes, *stored_codes(profile, codes)]
     known = [parameter for code in codes if (parameter := profile.get(code)) is not None]
-    codes += [p.scale_by.parameter for p in known if p.scale_by]
+    codes += [p.scale_source for p in known if p.scale_source]
     codes += [p.unit_by.parameter for p in known if p.unit_by]
     return list(dict.fromkeys([*codes, *([reported.parameter] if reported else [])]))
 

@@ -100,7 +100,7 @@ def typed_text(
 
 def depends_on(parameter: Parameter) -> tuple[str, ...]:
     """Return the codes that must be read, or known as missing, to show a value in its unit."""
-    scale = parameter.scale_by.parameter if parameter.scale_by else ""
+    scale = parameter.scale_source
     unit = parameter.unit_by.parameter if parameter.unit_by else ""
     return tuple(code for code in (scale, unit) if code)
 
@@ -121,4 +121,4 @@ def number_of(
 
 def scale_sources(profile: Profile) -> frozenset[str]:
     """Return the codes of the parameters that other parameters' scales depend on."""
-    return frozenset(p.scale_by.parameter for p in profile.parameters if p.scale_by is not None)
+    return frozenset(p.scale_source for p in profile.parameters if p.scale_source)

@@ -35,7 +35,9 @@ def is_raw(family: Profile, parameter: Parameter) -> bool:
     """
     measured = parameter.access == "r" and parameter.quantity is None
     measured = measured and (parameter.min, parameter.max, parameter.factory) == (None, None, None)
-    reported = bool(parameter.unit or parameter.scale_by or parameter.unit_by or parameter.values)
+    reported = bool(
+        parameter.unit or parameter.scale_source or parameter.unit_by or parameter.values
+    )
     reported = reported or bool(parameter.enumeration or parameter.bits) or parameter.scale != "1"
     return not reported and (measured or not is_verified(parameter)) and word_count(parameter) == 1
 

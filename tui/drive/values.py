@@ -135,6 +135,19 @@ def decimals_of(scale: Decimal) -> int:
     return own if own <= needed + SPARE_DECIMALS else needed
 
 
+USUAL_FULL_SCALE = Decimal(100)
+"""Assumed value of a full scale for the width of its decimals: 50 Hz, 100 %, 1500 rpm."""
+
+
+def possible_decimals(parameter: Parameter) -> int:
+    """Return the most decimals that any scale of a parameter has."""
+    if parameter.full_scale is not None:
+        return decimals_of(USUAL_FULL_SCALE / parameter.full_scale.counts)
+    by = parameter.scale_by
+    scales = [parameter.scale, *(by.scales.values() if by is not None else ())]
+    return max(decimals_of(Decimal(scale)) for scale in scales)
+
+
 def decode(
     parameter: Parameter, raw: int, names: Mapping[int, str], scale: Decimal | None
 ) -> Value:
@@ -159,7 +172,13 @@ def decode(
 def is_enumeration(parameter: Parameter) -> bool:
     """Return True if the raw values are names rather than a number."""
     named = bool(parameter.enumeration or parameter.values)
-    return named and not parameter.unit and parameter.scale == "1" and not _is_number(parameter)
+    return (
+        named
+        and not parameter.unit
+        and parameter.scale == "1"
+        and parameter.full_scale is None
+        and not _is_number(parameter)
+    )
 
 
 def _is_number(parameter: Parameter) -> bool:
@@ -191,9 +210,10 @@ def encode(
         raw = _hexadecimal(parameter, typed)
     if raw is None:
         if scale is None:
-            by = parameter.scale_by
-            text = _SCALE_NOT_READ if by else _OTHER_SCALE_NOT_READ
-            raise ValueRefused(text.format(code=parameter.code, source=by.parameter if by else ""))
+            source = parameter.scale_source
+            text = _SCALE_NOT_READ if source else _OTHER_SCALE_NOT_READ
+            text = _NO_FULL_SCALE if parameter.full_scale is not None else text
+            raise ValueRefused(text.format(code=parameter.code, source=source))
         number = _number(parameter, typed, names)
         counts = number / scale
         raw = int(counts.to_integral_value(ROUND_HALF_UP))
@@ -205,6 +225,9 @@ def encode(
 
 
 _SCALE_NOT_READ = "{code} cannot be written: its scale depends on {source}, which was not read."
+_NO_FULL_SCALE = (
+    "{code} cannot be written: its full scale is the value of {source}, which is 0 or was not read."
+)
 _OTHER_SCALE_NOT_READ = (
     "{code} cannot be written: its scale depends on another parameter, which was not read."
 )
@@ -308,6 +331,7 @@ __all__ = [
     "is_enumeration",
     "is_field",
     "percent_of",
+    "possible_decimals",
     "raw_range",
     "set_bits",
     "to_words",

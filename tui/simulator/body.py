@@ -136,6 +136,10 @@ class Body:
 
         Independent of the panel's conversion, so that tests show errors in that one.
         """
+        if (full := parameter.full_scale) is not None:
+            source = self.registers.named(full.parameter)
+            value = 0.0 if source is None else self.engineering(source)
+            return (value or 1.0) / full.counts
         follows = parameter.scale_by
         if follows is None:
             return float(parameter.scale)

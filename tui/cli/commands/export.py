@@ -359,5 +359,5 @@ def _path_of(wish: ExportOptions, wall: float) -> Path:
 def value_title(code: str, found: History) -> str:
     """The heading of the values of a code, with unit and scale: `LCR [A, scale 0.1]`."""
     entry = found.entry
-    scale = "" if entry is None or entry.scale_by is not None else f"scale {entry.scale}"
+    scale = "" if entry is None or entry.scale_source else f"scale {entry.scale}"
     return Column(code, ", ".join(part for part in (found.unit, scale) if part)).title

@@ -246,6 +246,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "unit": "Unit.",
         "scale": "Value of one count, a decimal in quotes.",
         "scale_by": "Scale that depends on another parameter.",
+        "full_scale": "Full scale that is the value of another parameter.",
         "unit_by": "Unit that depends on another parameter.",
         "min": "Lowest raw value.",
         "max": "Highest raw value.",

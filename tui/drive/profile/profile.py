@@ -224,8 +224,13 @@ class Profile:
         """Return the value of one count, from raw values by code.
 
         `absent` names parameters that the drive reported as missing. None if the scale depends on a
-        parameter whose value is unknown: then the value must be shown raw and never written.
+        parameter whose value is unknown, or on a full scale of 0: then the value must be shown raw
+        and never written.
         """
+        if (full := parameter.full_scale) is not None:
+            source, raw = self[full.parameter], raws.get(full.parameter)
+            # at a full scale of 0 no count means anything
+            return None if not raw else raw * Decimal(source.scale) / full.counts
         follows = parameter.scale_by
         if follows is None:
             return Decimal(parameter.scale)

@@ -156,7 +156,7 @@ def _resolve(
     for follows in (False, True):
         for edit in edits:
             parameter = profile[edit.code]
-            if (parameter.scale_by is not None) is follows:
+            if bool(parameter.scale_source) is follows:
                 done[edit.code] = _encoded(edit, profile, raws, after, absent)
         after.update({edit.code: edit.new for edit in done.values()})
     return tuple(done[edit.code] for edit in edits)
@@ -199,11 +199,11 @@ def consequences(
     after = edits.after(raws)
     reported: list[str] = []
     for parameter in profile.parameters:
-        follows = parameter.scale_by
+        follows = parameter.scale_source
         raw = raws.get(parameter.code)
-        if follows is None or follows.parameter not in edits or parameter.code in edits:
+        if not follows or follows not in edits or parameter.code in edits:
             continue
-        if raw is None or raws.get(follows.parameter) is None:
+        if raw is None or raws.get(follows) is None:
             continue
         before = shown(profile, parameter, raw, raws, absent)
         later = shown(profile, parameter, raw, after, absent)

@@ -91,7 +91,7 @@ def _differs(
     if parameter.factory_of is not None:
         # the drive may round its own product differently
         return abs(held - factory) > 1
-    if parameter.scale_by is None:
+    if not parameter.scale_source:
         return held != factory
     first = _first_scales(profile, parameter, raws, absent)
     was = shown(profile, parameter, factory, first, absent)
@@ -104,8 +104,8 @@ def _first_scales(
     profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str]
 ) -> Mapping[str, int]:
     """Return the raw values, with the factory settings of the parameter's scale sources."""
-    follows = parameter.scale_by
-    source = None if follows is None else profile[follows.parameter]
+    follows = parameter.scale_source
+    source = profile[follows] if follows else None
     if source is None or source.factory is None or source.code in absent:
         return raws
     return {**raws, source.code: source.factory}

@@ -135,9 +135,8 @@ def builds_on(
     the drive's present values. An edit depends on the source of its scale, on a setting that
     changes others when it is written, and on a limit that it would exceed without that edit.
     """
-    follows = profile[edit.code].scale_by
-    if follows is not None and follows.parameter in missed:
-        return follows.parameter
+    if (follows := profile[edit.code].scale_source) in missed:
+        return follows
     for code in missed:
         if profile[code].resets_others:
             return code

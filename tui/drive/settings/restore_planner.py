@@ -107,7 +107,7 @@ class _Planner:
             raw = self.source.raws.get(parameter.code)
             if raw is None:
                 continue
-            typed = self._typed(self.profile, parameter, raw) if parameter.scale_by else ""
+            typed = self._typed(self.profile, parameter, raw) if parameter.scale_source else ""
             self._consider(parameter, typed, raw)
         for code, text in self.source.unknown.items():
             self._skip(code, "unknown", f"the profile {self.profile.id} does not have it", text)
@@ -179,8 +179,7 @@ class _Planner:
             self._wanted[code] = edit
 
     def _scales(self, parameter: Parameter) -> list[Edit]:
-        follows = parameter.scale_by
-        return [e for c, e in self._wanted.items() if follows and c == follows.parameter]
+        return [e for c, e in self._wanted.items() if c == parameter.scale_source]
 
     def _new_text(self, parameter: Parameter, typed: str, raw: int) -> str:
         if typed:

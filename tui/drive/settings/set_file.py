@@ -223,7 +223,7 @@ class _Resolver:
         for follows in (False, True):
             for entry in entries:
                 parameter = self.profile[entry.code]
-                if (parameter.scale_by is not None) is follows:
+                if bool(parameter.scale_source) is follows:
                     self.found[entry.code] = self._raw(parameter, entry, {**reported, **self.found})
         return {entry.code: self.found[entry.code] for entry in entries}
 

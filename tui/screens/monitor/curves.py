@@ -11,7 +11,7 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.drive.values import NOT_AVAILABLE
+from tui.drive.values import NOT_AVAILABLE, possible_decimals
 from tui.safety import STALE_CYCLES
 from tui.session.monitor.trend import (
     REFERENCE_PLACE,
@@ -54,7 +54,7 @@ from .time_axis import (
     points_of_page,
     ticks_of,
 )
-from .view import View, decimal_places, directed, end_of
+from .view import View, directed, end_of
 
 NAMES: dict[Quantity, str] = {"output_frequency": "output", "motor_current": "current"}
 
@@ -154,7 +154,7 @@ def _present(view: View, band: Band) -> tuple[float, str] | None:
         number = directed(view, band.parameter, number)
     if number is None:
         return None
-    digits = decimal_places(band.parameter)
+    digits = possible_decimals(band.parameter)
     return number, f"{number:.{digits}f}"
 
 
@@ -239,7 +239,7 @@ def _read_out(view: View, moment: float, width: int) -> Text:
         if value is None:
             text.append(f"{NOT_AVAILABLE:>7}", FAINT)
         else:
-            text.append(f"{value:>7.{decimal_places(parameter)}f}", STRONG)
+            text.append(f"{value:>7.{possible_decimals(parameter)}f}", STRONG)
         text.append(f" {parameter.unit or 'raw'}", FAINT)
     at = found[0] if found is not None else moment
     head = Text(f" {clock_text(at + view.apart)}", PLAIN if found is not None else STALE)

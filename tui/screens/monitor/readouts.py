@@ -14,7 +14,7 @@ from rich.text import Text
 
 from tui.drive.profile.profile import Profile, mark_of
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.drive.values import NOT_AVAILABLE, Value
+from tui.drive.values import NOT_AVAILABLE, Value, possible_decimals
 from tui.session.monitor.trend import TREND_QUANTITIES, readout_parameter
 from tui.session.shown import Quality, Shown
 from tui.widgets.drawing import short
@@ -24,7 +24,7 @@ from tui.widgets.readout import ROWS, big, dashes, readout_cells
 
 from .curves import bar_end
 from .time_axis import points_of_page
-from .view import View, bar_number, decimal_places, directed, end_of
+from .view import View, bar_number, directed, end_of
 
 SIGN_CELLS = 5
 """Extra cells of the frequency's readout, for its sign and a third digit."""
@@ -141,7 +141,7 @@ def _field(parameter: Parameter | None, quantity: Quantity) -> int:
     signed = quantity != "motor_current"
     if parameter is None or not parameter.unit:
         return readout_cells(0, signed=signed, whole=5)
-    decimals = decimal_places(parameter)
+    decimals = possible_decimals(parameter)
     # a current of 100 A or more loses its decimal here; the status bar shows it
     return readout_cells(decimals, signed=signed, whole=3 if signed or not decimals else 2)
 
@@ -191,7 +191,7 @@ def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[T
     ]
     if not page:
         return [Text()] * ROWS
-    digits = decimal_places(parameter)
+    digits = possible_decimals(parameter)
     seen = [value for point in page if (value := point.values[place]) is not None]
     highest, lowest = max(seen), min(seen)
     covered = "" if view.lean else f"{page[-1].time - page[0].time:.0f} s"

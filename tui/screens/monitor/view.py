@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from decimal import Decimal
 
 from tui.bus.api import LineCounters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import MonitoringValue, Parameter
-from tui.drive.values import Value, decimals_of
+from tui.drive.values import Value
 from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
 from tui.session.drive_state import with_direction
@@ -171,10 +170,3 @@ def end_of(view: View, end: str) -> float | None:
 def bar_number(value: Value) -> float | None:
     """Return the engineering value for a bar; None for names and words."""
     return None if value.number is None else float(value.number)
-
-
-def decimal_places(parameter: Parameter) -> int:
-    """Return the most decimals that any scale of the parameter has."""
-    follows = parameter.scale_by
-    scales = [parameter.scale, *(follows.scales.values() if follows is not None else ())]
-    return max(decimals_of(Decimal(scale)) for scale in scales)

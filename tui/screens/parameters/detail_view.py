@@ -84,8 +84,8 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
     found += _taught(editor, parameter)
     if parameter.base:
         found.append(f"In percent of {parameter.base}")
-    if parameter.scale_by is not None and parameter.scale_by.parameter not in parameter.note:
-        found.append(f"Its step depends on {parameter.scale_by.parameter}")
+    if (source := parameter.scale_source) and source not in parameter.note:
+        found.append(f"Its step depends on {source}")
     if is_enumeration(parameter) and parameter.access != "r":
         choices = dict.fromkeys(editor.session.profile.names(parameter).values())
         found.append(f"One of: {', '.join(choices)}")

@@ -6,12 +6,10 @@ import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
-from decimal import Decimal
 
 from rich.style import Style
 
 from tui.drive.profile.schema import Parameter
-from tui.drive.values import decimals_of
 from tui.session.record.decoding import HistoryPoint
 from tui.session.shown import Shown
 from tui.widgets.curve import BRAILLE, CurveScale, CurveSigns, Plot
@@ -107,12 +105,6 @@ def mark_places(view: TrendView, room: TrendRoom) -> dict[int, tuple[str, Style]
         if column is not None:
             found[column] = sign, style
     return found
-
-
-def decimals_of_entry(entry: Parameter) -> int:
-    """Return the most decimals that any scale of a parameter has."""
-    scales = [entry.scale, *(entry.scale_by.scales.values() if entry.scale_by is not None else ())]
-    return max(decimals_of(Decimal(scale)) for scale in scales)
 
 
 def clock_of(wall: float, *, day: bool = False) -> str:

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 
+from tui.drive.values import possible_decimals
 from tui.session.console import DriveConsole
 from tui.session.monitor.trend_bands import MOST_BANDS, stored_bands
 from tui.session.record.history import oldest_reply
@@ -16,7 +17,7 @@ from tui.widgets.lines import Lines
 
 from ..keys.table import bindings
 from .band_keys import BandKeys
-from .contents import BandView, TrendRoom, TrendView, decimals_of_entry
+from .contents import BandView, TrendRoom, TrendView
 from .event_list import trend_events
 from .loading import first_bands
 from .page import TrendPage
@@ -118,7 +119,7 @@ class TrendScreen(BandKeys):
 
     def _band(self, trace: BandTrace, moment: float, *, several: bool, turned: bool) -> BandView:
         page, entry = self.page, trace.entry
-        digits = decimals_of_entry(entry) if entry is not None else 1
+        digits = possible_decimals(entry) if entry is not None else 1
         reach = reach_of_trace(trace)
         name = f"{trace.band.device} {trace.band.code}" if several else trace.band.code
         note = "" if trace.loaded else LOADING_RECORD

@@ -20,7 +20,7 @@ from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, slot_tar
 from tui.drive.blocks.wire_cost import span
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.read_plan import WireTiming
-from tui.drive.shown import shown
+from tui.drive.shown import depends_on, shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from ..drive import DriveSession
@@ -196,8 +196,7 @@ class Mapper:
             wanted += [choice.parameter for choice in block.choices]
         profile = self.session.profile
         for parameter in map(profile.__getitem__, tuple(wanted)):
-            sources = (parameter.scale_by, parameter.unit_by)
-            wanted += [source.parameter for source in sources if source is not None]
+            wanted += depends_on(parameter)
         return [code for code in dict.fromkeys(wanted) if profile[code].access != "w"]
 
     async def _direct(self, codes: Sequence[str]) -> dict[str, Reading]:

@@ -42,10 +42,12 @@ from .access import CommandAccess, CommandHistory
 from .motor_start import MotorStart, check_scale, with_effect, write_reference
 from .reference import (
     Reference,
+    is_signed,
     parse_reference,
     reference_codes,
     reference_parameters,
     step_in,
+    with_sign,
     within_limits,
 )
 from .unblock_hint import block_reason_text
@@ -277,7 +279,25 @@ async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | 
 async def give_reference(access: CommandAccess, text: str) -> str:
     """Write a typed reference; return its result as text."""
     wanted = await _typed_reference(access, text)
-    return await write_reference(access, wanted, replaceable=True)
+    return await write_reference(access, _kept_direction(access, wanted), replaceable=True)
+
+
+def _kept_direction(access: CommandAccess, wanted: Reference) -> Reference:
+    """Return a typed reference with the sign of the present one, which is the direction.
+
+    Raises OrderRefused if the present one is not known.
+    """
+    profile, code = access.session.profile, wanted.parameter.code
+    if not is_signed(profile, code):
+        return wanted
+    held, last = access.raws.get(code), access.given.wanted
+    if held is None:
+        raise OrderRefused(
+            f"Not written: {code} was not read, and its sign is the direction of rotation."
+        )
+    # at 0 the last reference still shows the direction of the run command
+    reverse = held < 0 or (held == 0 and last is not None and last.is_negative)
+    return with_sign(profile, wanted, reverse=reverse)
 
 
 async def step_reference(access: CommandAccess, hertz: Decimal) -> str:
@@ -289,10 +309,13 @@ async def step_reference(access: CommandAccess, hertz: Decimal) -> str:
     value = reading.value if reading is not None else None
     if parameter is None or value is None or value.number is None or value.unit == "raw":
         raise OrderRefused(f"It is not known where {profile.name} takes its reference.")
-    number = value.number + hertz * step_in(value.unit)
+    signed = is_signed(profile, parameter.code)
+    # the sign of such a word is the direction, and a step changes the speed
+    now = abs(value.number) if signed else value.number
+    number = now + hertz * step_in(value.unit)
     number = within_limits(profile, number, readings, parameter)
     wanted = parse_reference(profile, f"{number:f}{value.unit}", readings)
-    return await write_reference(access, wanted, replaceable=True)
+    return await write_reference(access, _kept_direction(access, wanted), replaceable=True)
 
 
 async def _typed_reference(access: CommandAccess, text: str) -> Reference:

@@ -13,7 +13,16 @@ from tui.drive.profile.schema import Chart, Order, OrderId, Parameter
 from ..drive import DriveSession
 from ..starts.keeper import record_start
 from .access import STATE_POLL_INTERVAL, CommandAccess, NotFollowed
-from .reference import Reference, other_scale, read_back_differs, reference_codes, scale_codes
+from .reference import (
+    Reference,
+    is_signed,
+    other_scale,
+    read_back_differs,
+    reference_codes,
+    reference_parameters,
+    scale_codes,
+    with_sign,
+)
 
 LOOKS = 10
 """Reads within which the motor must turn in the commanded direction."""
@@ -50,7 +59,8 @@ def reference_text(reference: Reference) -> str:
     """Return a written reference as a text, and how it differs from the requested one."""
     text = REFERENCE_TEXTS[reference.is_converted, bool(reference.rounded)]
     code, requested = reference.parameter.code, reference.requested
-    return text.format(value=reference.text, code=code, requested=requested)
+    value = f"-{reference.text}" if reference.is_negative else reference.text
+    return text.format(value=value, code=code, requested=requested)
 
 
 async def check_scale(access: CommandAccess) -> None:
@@ -101,7 +111,7 @@ class MotorStart:
         await check_scale(access)
         await record_start(self.session, "reverse" if id == "reverse" else "forward", access.permit)
         try:
-            await self._give_reference(reference)
+            await self._give_reference(reference, reverse=id == "reverse")
             if chart.runs_in is not None:
                 await self._walk(chart, same[0], chart.runs_in)
             else:
@@ -137,23 +147,27 @@ class MotorStart:
             " assigned to something else."
         )
 
-    async def _give_reference(self, reference: Reference | None) -> None:
+    async def _give_reference(self, reference: Reference | None, *, reverse: bool) -> None:
         """Write the reference, read it back as a value, and compare it with the request.
 
         Without one, the current reference is written: some drives run only after a write of it.
         """
-        access, wanted = self.access, reference or self.access.given.wanted
-        if reference is not None:
-            await write_reference(access, reference)
+        access, profile = self.access, self.session.profile
+        wanted = reference or access.given.wanted
+        if wanted is not None:
+            wanted = with_sign(profile, wanted, reverse=reverse)
+        if reference is not None and wanted is not None:
+            await write_reference(access, wanted)
         elif wanted is not None:
             await self._write_again(wanted.parameter, wanted.raw)
-        elif (parameter := self.session.profile.quantity("command_frequency")) is not None:
+        elif (parameter := next(iter(reference_parameters(profile)), None)) is not None:
             raw = (await access.read([parameter.code]))[parameter.code].raw
             if raw is not None:
+                if is_signed(profile, parameter.code):
+                    raw = -abs(raw) if reverse else abs(raw)
                 await self._write_again(parameter, raw)
         if wanted is None or wanted.parameter.access == "w":
             return
-        profile = self.session.profile
         readings = await access.read(reference_codes(profile))
         if differs := read_back_differs(profile, wanted, readings):
             raise WrongReference(f"Not started: {differs}. Give the reference again.")

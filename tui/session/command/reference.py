@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 
 from tui.drive.errors import UnitRefused, ValueRefused
@@ -18,9 +18,11 @@ from tui.drive.sentences import any_of
 from tui.drive.shown import depends_on, number_of, raw_of_text
 from tui.drive.taught_profile import reference_of
 from tui.drive.units import factor_between, spelled
+from tui.drive.values import check_raw
 
 from ..reading import reading_of
 from ..shown import Shown
+from .reference_units import MOTOR_DATA, ReferenceUnits
 
 _TYPED = re.compile(r"([+-]?\d+(?:[.,]\d+)?)\s*(1/min|[^\s\d.,+\-/][^\d.,+\-]*)?")
 LIMITS: tuple[Quantity, ...] = ("low_speed", "high_speed", "max_frequency")
@@ -49,6 +51,8 @@ class Reference:
     """The drive's unit."""
     step: Decimal
     """One count in the drive's unit."""
+    is_negative: bool = False
+    """True if the drive gets it negated, to run in reverse: then `raw` is negative."""
 
     @property
     def is_converted(self) -> bool:
@@ -60,6 +64,25 @@ def reference_parameters(profile: Profile) -> list[Parameter]:
     """Return the reference words of a drive; a number without a unit goes to the first."""
     found = (profile.quantity(quantity) for quantity in REFERENCES)
     return [parameter for parameter in found if parameter is not None]
+
+
+def is_signed(profile: Profile, code: str) -> bool:
+    """Return True if the sign of a reference word gives the direction of rotation."""
+    ways = profile.data.references
+    return any(way.parameter == code and way.reverse == "negative" for way in ways)
+
+
+def with_sign(profile: Profile, reference: Reference, *, reverse: bool) -> Reference:
+    """Return a reference with the sign for a direction, if its word has one.
+
+    Raises ValueRefused if the word cannot hold the negative value.
+    """
+    parameter = reference.parameter
+    if not is_signed(profile, parameter.code) or reference.is_negative is reverse:
+        return reference
+    raw = -reference.raw
+    check_raw(parameter, raw, profile.names(parameter), reference.step)
+    return replace(reference, raw=raw, is_negative=reverse)
 
 
 def step_in(unit: str) -> int:
@@ -187,7 +210,8 @@ def read_back_differs(profile: Profile, wanted: Reference, readings: Mapping[str
         why = reading.error if reading else ""
         return f"{code} could not be read back: {why}" if why else f"{code} could not be read back"
     same = now.parameter.code == code and value.unit == now.unit
-    if same and abs(value.number - now.number) <= min(now.step, wanted.step):
+    expected = -now.number if wanted.is_negative else now.number
+    if same and abs(value.number - expected) <= min(now.step, wanted.step):
         return ""
     if same and wanted.is_converted:
         known, unit = ReferenceUnits(profile, readings), wanted.requested.rpartition(" ")[2]
@@ -315,86 +339,3 @@ def _shortened(number: Decimal, rounding: str) -> Decimal:
 def _code(profile: Profile, quantity: Quantity) -> str:
     parameter = profile.quantity(quantity)
     return parameter.code if parameter else quantity
-
-
-MOTOR_DATA: tuple[Quantity, ...] = ("rated_frequency", "rated_speed")
-"""Ratings from which the pole pairs of the motor follow."""
-NEARLY_ONE_MORE = Decimal("0.05")
-"""Tolerance for rounded rated speeds: 1501 rpm at 50 Hz means two pole pairs, not one."""
-
-
-@dataclass(frozen=True, slots=True)
-class ReferenceUnits:
-    """Conversions between units, with the readings of one drive."""
-
-    profile: Profile
-    readings: Mapping[str, Shown]
-
-    @property
-    def raws(self) -> dict[str, int]:
-        """Raw values by code."""
-        return {
-            code: reading.raw for code, reading in self.readings.items() if reading.raw is not None
-        }
-
-    @property
-    def absent(self) -> set[str]:
-        """Codes of words that the drive does not have."""
-        return {code for code, reading in self.readings.items() if reading.absent}
-
-    def unit(self, parameter: Parameter) -> str:
-        """Return the unit of a word; `raw` if it depends on a word that was not read."""
-        return self.profile.unit(parameter, self.raws)
-
-    def quantity(self, quantity: Quantity) -> tuple[Decimal, str] | None:
-        """Return the number and unit of a quantity; None if not read, or without a scale."""
-        return self._number(self.profile.quantity(quantity))
-
-    def whole(self, parameter: Parameter) -> Parameter | None:
-        """Return the parameter whose value is 100 % of this one, in a physical unit."""
-        return self.profile.get(parameter.rating) if parameter.rating else None
-
-    def converted(
-        self, number: Decimal, unit: str, other: str, whole: Parameter | None = None
-    ) -> Decimal | None:
-        """Convert a number to another unit; None if no conversion is known.
-
-        `whole` is the parameter whose value is 100 %.
-        """
-        if (factor := factor_between(unit, other)) is not None:
-            return number * factor
-        hundred = self._number(whole)
-        if hundred is not None and hundred[0] and factor_between(unit, "%"):
-            return self.converted(number * hundred[0] / 100, hundred[1], other)
-        if hundred is not None and hundred[0] and factor_between(other, "%"):
-            part = self.converted(number, unit, hundred[1])
-            return None if part is None else part * 100 / hundred[0]
-        return self._between_speeds(number, unit, other)
-
-    def _between_speeds(self, number: Decimal, unit: str, other: str) -> Decimal | None:
-        """Convert between Hz and rpm at synchronous speed."""
-        pairs = self._pole_pairs()
-        if pairs is None:
-            return None
-        for text, two, times, by in (("Hz", "rpm", 60, pairs), ("rpm", "Hz", pairs, 60)):
-            before, after = factor_between(unit, text), factor_between(two, other)
-            if before is not None and after is not None:
-                return number * before * times / by * after
-        return None
-
-    def _pole_pairs(self) -> Decimal | None:
-        frequency, speed = (self.quantity(literal_type) for literal_type in MOTOR_DATA)
-        if not frequency or not speed or frequency[0] <= 0 or speed[0] <= 0:
-            return None
-        hertz, rpm = factor_between(frequency[1], "Hz"), factor_between(speed[1], "rpm")
-        if hertz is None or rpm is None:
-            return None
-        pairs = 60 * frequency[0] * hertz / (speed[0] * rpm)
-        return max(Decimal(1), Decimal(int(pairs + NEARLY_ONE_MORE)))
-
-    def _number(self, parameter: Parameter | None) -> tuple[Decimal, str] | None:
-        reading = self.readings.get(parameter.code) if parameter is not None else None
-        value = reading_of(reading).value if reading is not None else None
-        if value is None or value.number is None or value.unit == "raw":
-            return None
-        return value.number, value.unit

@@ -106,8 +106,8 @@ class _Work:
     def _with_sources(self, codes: Iterable[str]) -> list[str]:
         found = list(codes)
         for code in tuple(found):
-            follows = self.session.profile[code].scale_by
-            found += [follows.parameter] if follows else []
+            follows = self.session.profile[code].scale_source
+            found += [follows] if follows else []
         return list(dict.fromkeys(found))
 
     @property
@@ -188,7 +188,7 @@ class _Work:
     def _means(self, edit: Edit) -> bool:
         """Return True if the raw value still has the staged meaning: its scale may have changed."""
         parameter = self.session.profile[edit.code]
-        if parameter.scale_by is None:
+        if not parameter.scale_source:
             return True
         retrying = self.retrying
         now = shown(self.session.profile, parameter, edit.new, retrying.raws, retrying.lacking)
@@ -199,8 +199,7 @@ class _Work:
         now = shown(
             self.session.profile, parameter, held, self.retrying.raws, self.retrying.lacking
         )
-        if parameter.scale_by is not None and not self._means(edit):
-            source = parameter.scale_by.parameter
+        if (source := parameter.scale_source) and not self._means(edit):
             return (
                 f"{edit.code} was not written: {source}, which sets its scale, has changed. Check"
                 " the value, and apply again."

@@ -112,8 +112,7 @@ class Staging:
         profile = self.session.profile
 
         def stays(edit: Edit) -> bool:
-            scale = profile[edit.code].scale_by
-            return edit.code in waits or (scale is not None and scale.parameter in waits)
+            return edit.code in waits or profile[edit.code].scale_source in waits
 
         self.edits = Edits(tuple(edit for edit in left if stays(edit)))
 

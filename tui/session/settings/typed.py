@@ -29,7 +29,7 @@ async def stage_typed(
     profile = session.profile
     codes = [code for code, _ in pairs]
     sources = scale_sources(profile)
-    follow = [p.code for p in profile.parameters if p.scale_by and set(codes) & sources]
+    follow = [p.code for p in profile.parameters if p.scale_source and set(codes) & sources]
     retrying = RetryingReader(session)
     await retrying.ask_many(codes + sorted(sources) + follow)
     edits = Edits()

@@ -145,7 +145,7 @@ class WatchedValues:
         due = [code for code in self.visible if self._requested.get(code, 0.0) < oldest]
         if not due:
             return []
-        follows = [p.scale_by.parameter for c in due if (p := self._parameter(c)) and p.scale_by]
+        follows = [p.scale_source for c in due if (p := self._parameter(c)) and p.scale_source]
         return list(dict.fromkeys((*follows, *due)))
 
     def _parameter(self, code: str) -> Parameter | None:

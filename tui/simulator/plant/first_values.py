@@ -65,6 +65,14 @@ def first_values(
             raw = to_raw(profile, parameter, plate[parameter.quantity])
         values[parameter.code] = _lowest(profile, parameter) if raw is None else raw
     for parameter in profile.parameters:
+        full = parameter.full_scale
+        if full and parameter.factory is None and parameter.code.casefold() not in chosen:
+            # the scale is known now
+            value = plate.get(parameter.quantity)
+            scale = values[full.parameter] * Decimal(profile[full.parameter].scale) / full.counts
+            if value is not None and scale:
+                values[parameter.code] = to_raw(profile, parameter, value, scale)
+    for parameter in profile.parameters:
         # values that depend on the drive's rated current, once that is known
         if parameter.factory_of is not None and parameter.code.casefold() not in chosen:
             raw = counts_of(profile, parameter, parameter.factory_of, values)
@@ -111,8 +119,13 @@ def _lowest(profile: Profile, parameter: Parameter) -> int:
     return min(max(0, low), high)
 
 
-def to_raw(profile: Profile, parameter: Parameter, value: float) -> int:
-    """Return the raw value nearest to an engineering value, within the type; factory scale."""
-    counts = Decimal(repr(float(value))) / Decimal(parameter.scale)
+def to_raw(
+    profile: Profile, parameter: Parameter, value: float, scale: Decimal | None = None
+) -> int:
+    """Return the raw value nearest to an engineering value, within the type.
+
+    The default is the parameter's own scale, as from the factory.
+    """
+    counts = Decimal(repr(float(value))) / (scale or Decimal(parameter.scale))
     low, high = type_range(parameter)
     return min(max(int(counts.to_integral_value(ROUND_HALF_UP)), low), high)

@@ -140,4 +140,46 @@ def start_up(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             seen.setdefault(code, step.step)
 
 
-LIMIT_RULES = (circles, proposed_values, factory_settings, start_up)
+def full_scales(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield full scales of another unit, or from a parameter without a scale of its own."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    for index, parameter in enumerate(data.parameters):
+        full = parameter.full_scale
+        source = parameters.get(full.parameter) if full is not None else None
+        if source is None:
+            continue
+        at: TomlPath = ("parameters", index, "full_scale")
+        start = f"parameter {parameter.code}: its full scale {source.code}"
+        if parameter.scale != "1" or parameter.scale_by is not None:
+            yield at, f"parameter {parameter.code}: it has full_scale, so omit scale and scale_by."
+        if source.scale_source or source.unit_by is not None or source.access == "w":
+            yield at, f"{start} must be readable, with a scale and a unit that never change."
+        if not parameter.unit or parameter.unit != source.unit:
+            own, other = parameter.unit or "none", source.unit or "none"
+            yield at, f"{start} has the unit {other}, and its own unit is {own}. Both are the same."
+
+
+def signed_references(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield references with a sign for the direction whose word or command contradicts that."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    for index, way in enumerate(data.references):
+        word = parameters.get(way.parameter)
+        if way.reverse != "negative" or word is None:
+            continue
+        at: TomlPath = ("references", index, "reverse")
+        if not word.type.startswith("int") or raw_range(word)[0] >= 0:
+            yield at, f"reference {word.code}: it holds no negative value. Use type int16 or int32."
+        if word.access == "w":
+            yield at, f"reference {word.code}: its sign must be readable: access rw."
+        for chart in data.charts:
+            by_id = {o.id: (o.parameter, o.words) for o in chart.orders}
+            if "reverse" in by_id and by_id["reverse"] != by_id.get("forward"):
+                yield (
+                    at,
+                    f"reference {word.code}: its sign gives the direction, but the commands"
+                    f" forward and reverse of the chart {chart.id} differ. Give both the same"
+                    " words.",
+                )
+
+
+LIMIT_RULES = (full_scales, signed_references, circles, proposed_values, factory_settings, start_up)

@@ -63,6 +63,8 @@ def _parameter_names(parameter: Parameter) -> Iterator[tuple[str, str]]:
     yield "rating", parameter.rating
     if parameter.scale_by:
         yield "scale_by", parameter.scale_by.parameter
+    if parameter.full_scale:
+        yield "full_scale", parameter.full_scale.parameter
     if parameter.unit_by:
         yield "unit_by", parameter.unit_by.parameter
     for key in ("factory_by", "min_of", "max_of", "factory_of"):

@@ -48,6 +48,7 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     if 3 not in codes and (3 in read_by or 4 not in codes):
         yield ("functions",), "function 3 is missing, so nothing can be read."
     writes = codes & {6, 16}
+    pairs = any(f.code == 16 and (f.max_write or 1) > 1 for f in data.functions)
     for index, parameter in enumerate(data.parameters):
         place = ("parameters", index)
         if parameter.function == 4 and 4 not in codes:
@@ -62,6 +63,12 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 (*place, "access"),
                 f"parameter {parameter.code}: two words are written by function 16, which is not"
                 " among the functions. Add it, or set access r.",
+            )
+        elif parameter.type.endswith("32") and not pairs:
+            yield (
+                (*place, "access"),
+                f"parameter {parameter.code}: two words are written at once, and function 16 has"
+                " no max_write above 1. Add max_write, or set access r.",
             )
         elif not writes:
             yield (

@@ -187,6 +187,8 @@ class ReferenceWay(Table, frozen=True, kw_only=True):
     parameter: str
     kind: Literal["frequency", "speed"]
     signed: bool = False
+    reverse: Literal["command", "negative"] = "command"
+    """Selection of the reverse direction: by the command, or by a negative reference."""
     feedback: str = ""
     scale_when: ScaleWhen | None = None
     """Condition for the scale of this profile."""

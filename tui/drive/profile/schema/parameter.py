@@ -60,6 +60,15 @@ class ScaleBy(Table, frozen=True, kw_only=True):
     """Scale if the drive reports that it has no such parameter; absent: unknown."""
 
 
+class FullScale(Table, frozen=True, kw_only=True):
+    """So many counts are the value of another parameter, in its unit (16384 at 3-03)."""
+
+    counts: Annotated[int, Meta(ge=1, le=0x7FFFFFFF)]
+    """Raw value that means the value of the other parameter."""
+    parameter: str
+    """The parameter that contains the full scale, such as a limit or the nameplate."""
+
+
 class FactoryBy(Table, frozen=True, kw_only=True):
     """A factory setting that depends on another parameter's raw value (HSP on bFr)."""
 
@@ -214,6 +223,8 @@ class Parameter(Table, frozen=True, kw_only=True):
     unit: str = ""
     scale: DecimalText = "1"
     scale_by: ScaleBy | None = None
+    full_scale: FullScale | None = None
+    """Full scale from another parameter of the same unit; instead of `scale`."""
     unit_by: UnitBy | None = None
     base: str = ""
     """Base of a percentage, if known."""
@@ -262,3 +273,10 @@ class Parameter(Table, frozen=True, kw_only=True):
     note: str = ""
     source: str
     confidence: Confidence
+
+    @property
+    def scale_source(self) -> str:
+        """Code of the parameter on which the scale depends; empty if the scale is fixed."""
+        if self.full_scale is not None:
+            return self.full_scale.parameter
+        return self.scale_by.parameter if self.scale_by is not None else ""
