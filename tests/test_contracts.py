@@ -286,8 +286,8 @@ def test_every_test_folder_is_run_by_one_of_two_commands() -> None:
     at_once = settings["tool"]["pytest"]["ini_options"]["testpaths"]
     folders = {f"tests/{found.parent.name}" for found in (ROOT / "tests").glob("*/test_*.py")}
     assert {*at_once} == {*(folders - {"tests/line"}), "tests/test_*.py"}
-    layer = ".venv/bin/python -m pytest -q -n 4"
-    assert f"{layer} tests/line" in README
+    layer = r"\.venv/bin/python -m pytest -q -n [0-9]+"
+    assert re.search(rf"{layer} tests/line", README)
     assert "export DRIVEPANEL_PEERS=required" in CI.read_text("utf-8")
     in_the_gate = layer.replace("-n 4", "-n 5")
     assert re.search(rf"^layer {in_the_gate}.* tests/line$", CI.read_text("utf-8"), re.MULTILINE)

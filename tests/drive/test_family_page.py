@@ -84,6 +84,46 @@ def test_masters_of_one_manual_are_not_those_of_another() -> None:
     assert not text_of("powerdrive", "Parts to order")
 
 
+# limits of the manuals' schematics: slaves, length, tap links, polarization, terminator
+SCHEMATICS = {
+    "Modbus standard": (
+        "31 slaves",
+        "1000 m at 19200",
+        "links of 20 m.",
+        "450 to 650 ohm",
+        "120 ohm",
+    ),
+    "Uni-Telway": ("28 slaves", "1000 m at 19200", "share 40 m, divided", "4700 ohm", "120 ohm"),
+    "Jbus, 2 wires": ("31 slaves", "1300 m at 19200", "Tap links of 3 m.", "470 ohm", "150 ohm"),
+    "Mixed": (
+        "31 slaves",
+        "1000 m at 19200",
+        "162 to 650 ohm",
+        "at most 18 stations have",
+        "120 ohm",
+    ),
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_schematics_have_the_limits_of_the_manuals(family: str) -> None:
+    rows = {row.head: row for row in section(family, "Schematics").rows if row.head}
+    for name, parts in SCHEMATICS.items():
+        assert [part for part in parts if part not in rows[name].text] == []
+        assert ("sister" in rows[name].sure) is (
+            family in LEROY or (family, name) == ("atv21", "Mixed")
+        )
+    assert ("In the drive" in rows) is (family in ALTIVAR)
+    assert ("switches low" in text_of(family, "Schematics")) is (family == "atv21")
+
+
+def test_drawing_of_a_schematic_is_not_wrapped() -> None:
+    lines = page_lines(family_page(library.load("atv71")), 100)
+    drawn = [line.text for line in lines if line.text.lstrip().startswith(("D1 --", "D0 --"))]
+    assert len(drawn) == 4
+    assert all(len(line) == 58 for line in drawn)
+
+
 def test_keypad_functions_without_an_address_are_named() -> None:
     assert [row.head for row in section("atv21", "On the keypad only").rows] == ["AUH", "AUF"]
 

@@ -226,6 +226,8 @@ def test_profile_is_created_from_another(tmp_path: Path, monkeypatch: pytest.Mon
     begun, source = library.load_file(path), library.load("atv312")
     assert (begun.id, begun.parameters) == ("my-drive", source.parameters)
     assert begun.data.signal_paths == source.data.signal_paths
+    assert begun.data.schematics == source.data.schematics
+    assert begun.data.parts == source.data.parts
     assert library.matching_profiles("ATV312HU09M3") == ["atv312"], "the copy takes no drive over"
     text = path.read_text()
     assert "rows_from" not in text, "what it shares stands in a file of one's own"

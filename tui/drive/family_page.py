@@ -14,7 +14,7 @@ from typing import Literal
 
 from .plain import plain
 from .profile.profile import Profile
-from .profile.schema import Confidence, Connector, ProfileData
+from .profile.schema import Confidence, Connector, LineSchematic, ProfileData
 
 SURENESS: dict[Confidence, str] = {
     "manual": "",
@@ -39,6 +39,8 @@ class PageRow:
     text: str
     sure: str = ""
     warns: bool = False
+    drawn: bool = False
+    """True for a line of a drawing, which is not wrapped."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,7 @@ def family_page(profile: Profile) -> list[PageSection]:
         *(PageSection(f"Pins: {c.name}", tuple(_pins(c))) for c in data.connectors),
         PageSection("Signal names", tuple(_signals(data))),
         PageSection("Line", tuple(_line(data))),
+        PageSection("Schematics", tuple(_schematics(data))),
         PageSection("Parts to order", tuple(_parts(data))),
         PageSection("Cables by master", tuple(_masters(data))),
         PageSection("Addresses", tuple(_addresses(data))),
@@ -94,6 +97,9 @@ def page_lines(sections: Sequence[PageSection], width: int) -> list[PageLine]:
 
 
 def _flowed(row: PageRow, width: int) -> Iterator[PageLine]:
+    if row.drawn:
+        yield PageLine("row", "  ", plain(row.text)[: width - 2])
+        return
     before = MARK_WIDTH if row.head in MARKS else HEAD_WIDTH
     text = plain(f"{row.text} [{row.sure}]" if row.sure else row.text)
     parts = textwrap.wrap(text, max(20, width - before)) or [""]
@@ -157,6 +163,43 @@ def _line(data: ProfileData) -> Iterator[PageRow]:
         yield PageRow("", link.note)
     for rule in data.line_rules:
         yield PageRow(rule.subject, rule.rule)
+
+
+TERMINATORS = {"RC": "120 ohm 0.25 W in series with 1 nF 10 V", "R": "150 ohm"}
+"""Terminators of a line, by their kind."""
+
+
+def _schematics(data: ProfileData) -> Iterator[PageRow]:
+    if (port := data.wiring.port) is not None:
+        yield PageRow("In the drive", port.note)
+    for item in data.schematics:
+        yield PageRow(item.name, schematic_text(item), SURENESS[item.confidence])
+        yield from (PageRow("", line, drawn=True) for line in item.drawing.splitlines())
+
+
+def schematic_text(item: LineSchematic) -> str:
+    """Return the limits of a schematic in sentences."""
+    parts = [
+        f"{item.slaves + 1} stations without a repeater, the master and {item.slaves} slaves.",
+        f"{item.length_m} m at {item.length_baud} bit/s.",
+        f"Tap links of {item.tap_m} m.",
+    ]
+    if item.shared_tap_m:
+        parts.append(f"The taps of one box share {item.shared_tap_m} m, divided by their number.")
+    if item.master_ohm:
+        span = " to ".join(map(str, dict.fromkeys(item.master_ohm)))
+        place = "in every station" if item.station_ohm else "in one place, at the master"
+        parts.append(f"Polarization of {span} ohm to each of 5 V and common, {place}.")
+    if item.total_ohm:
+        low, high = item.total_ohm
+        parts += [
+            f"All polarization resistors in parallel (Re) give {low} to {high} ohm.",
+            f"With {item.most_polarized_ohm} ohm at the master, at most {item.most_polarized}"
+            " stations have 4.7 kohm.",
+        ]
+    if item.best_ohm:
+        parts.append(f"Recommended are {item.best_ohm} ohm.")
+    return " ".join((*parts, f"At both ends: {TERMINATORS[item.terminator]}.", item.cable))
 
 
 def _parts(data: ProfileData) -> Iterator[PageRow]:

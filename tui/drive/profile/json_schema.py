@@ -211,6 +211,10 @@ OWN: Mapping[str, Mapping[str, str]] = {
     },
     "FamilyWarning": {"text": "Warning, as a sentence."},
     "Lamp": {"tells": "Meaning of the lamp."},
+    "LineSchematic": {
+        "length_baud": "Baud rate in bit/s for which the length applies.",
+        "most_polarized_ohm": "Polarization at the master in ohm for which that number applies.",
+    },
     "SignalName": {"signal": "Name of the signal in this profile."},
     "StartUpStep": {"stopped_only": "True if the motor must be at standstill."},
     "FactoryBy": {"raws": "Factory settings by the other parameter's raw value, in decimal."},
@@ -288,6 +292,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "connectors": "Connectors and their pins.",
         "line_rules": "Rules for the wiring.",
         "wiring": "Facts to know before touching the line or the drive.",
+        "schematics": "Schematics of the line, with their limits.",
         "parts": "Parts for the line, by catalog number.",
         "masters": "Cables from the master to the line.",
         "keypad_functions": "Functions of the keypad without an address on the line.",

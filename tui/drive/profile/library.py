@@ -132,7 +132,7 @@ def load_file(path: Path) -> Profile:
     return Profile(data, read_help)
 
 
-SHARED_TABLES = ("signal_paths", "parameters")
+SHARED_TABLES = ("signal_paths", "schematics", "parts", "masters", "parameters")
 """Tables that the packaged profiles share, in the order of a file."""
 
 

@@ -36,6 +36,7 @@ ROW_KEYS: Mapping[TomlPath, str] = {
     ("signal_paths",): "id",
     ("start_up",): "step",
     ("connectors",): "name",
+    ("schematics",): "id",
     ("parts",): "number",
     ("masters",): "name",
     ("groups",): "name",

@@ -23,7 +23,7 @@ from .link import (
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter, ParameterGroup
 from .signal_path import SignalPath
-from .wiring import CablingMaster, CablingPart, KeypadFunction, Wiring
+from .wiring import CablingMaster, CablingPart, KeypadFunction, LineSchematic, Wiring
 
 
 class StartUpStep(Table, frozen=True, kw_only=True):
@@ -164,6 +164,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
     wiring: Wiring = Wiring()
+    schematics: list[LineSchematic] = []
     parts: list[CablingPart] = []
     masters: list[CablingMaster] = []
     keypad_functions: list[KeypadFunction] = []

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import Confidence, Table
+from .base import Confidence, DecimalText, Identifier, Table
 
 
 class FamilyWarning(Table, frozen=True, kw_only=True):
@@ -46,6 +46,15 @@ class SignalName(Table, frozen=True, kw_only=True):
     """Its names by standard."""
 
 
+class PortPolarization(Table, frozen=True, kw_only=True):
+    """Polarization resistors that the drive itself can have."""
+
+    ohm: list[int]
+    """Possible resistances to 5 V and to the common, in ohm; 0 is none. The first is usual."""
+    note: str = ""
+    source: str = ""
+
+
 class Wiring(Table, frozen=True, kw_only=True):
     """Facts to know before touching the line or the drive."""
 
@@ -59,6 +68,43 @@ class Wiring(Table, frozen=True, kw_only=True):
     """Source of those names."""
     lamps: list[Lamp] = []
     """Lamps and display symbols."""
+    port: PortPolarization | None = None
+    """Polarization in the drive; absent if no document states it."""
+
+
+class LineSchematic(Table, frozen=True, kw_only=True):
+    """A schematic of the line, with its limits."""
+
+    id: Identifier
+    name: str
+    slaves: int
+    """Most slaves without a repeater."""
+    length_m: int
+    """Longest line at `length_baud`, in m."""
+    length_baud: int
+    tap_m: int
+    """Longest tap link, in m."""
+    shared_tap_m: int | None = None
+    """Length in m that the tap links of one junction box share, divided by their number."""
+    master_ohm: list[int] = []
+    """Least and most polarization at the master, in ohm."""
+    station_ohm: int = 0
+    """Polarization in every station, in ohm; 0 is none."""
+    total_ohm: list[int] = []
+    """Least and most of all polarization resistors in parallel, in ohm."""
+    best_ohm: int | None = None
+    """Recommended polarization of the whole line, in ohm."""
+    most_polarized: int | None = None
+    """Most stations with 4.7 kohm, if the master has `most_polarized_ohm`."""
+    most_polarized_ohm: int | None = None
+    terminator: Literal["RC", "R"]
+    """Terminator at both ends: RC is 120 ohm in series with 1 nF, R is 150 ohm."""
+    cable: str
+    """The cable in words."""
+    drawing: str = ""
+    """The schematic as text; it is shown unchanged."""
+    source: str = ""
+    confidence: Confidence = "manual"
 
 
 class CablingPart(Table, frozen=True, kw_only=True):
@@ -68,6 +114,14 @@ class CablingPart(Table, frozen=True, kw_only=True):
     """Catalog number, with the spaces that its manufacturer prints."""
     use: Literal["box", "terminator", "cable", "other"]
     """Its place in the line."""
+    ends: list[Literal["RJ45", "stripped", "SUB-D"]] = []
+    """Ends of a cable, connection of a terminator, or sockets of a box for tap links."""
+    taps: int | None = None
+    """Tap links of a box."""
+    meters: DecimalText | None = None
+    """Length of a cable, or of the cable of a box."""
+    terminator: Literal["RC", "R"] | None = None
+    """Its terminator: RC is 120 ohm with 1 nF, R is 150 ohm."""
     text: str
     """Length, ends and what it is for."""
     source: str = ""
