@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import tomli
-
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.converting import converted
 from tui.drive.profile.form import form_faults
+from tui.drive.profile.person_file import raise_faults, read_person_file
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
-from tui.drive.profile.toml_lines import TomlPath, toml_lines
+from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.sentences import any_of
 from tui.drive.settings.parameter_set import ParameterSet, SetError
 from tui.drive.settings.set_file import read_set
-from tui.drive.small_file import read_small_text
-from tui.drive.toml_text import toml_tables
 
 from .steps import (
     MOST_STEPS,
@@ -56,7 +52,6 @@ MEASURED: Mapping[Quantity, str] = {
 NEEDS_FREQUENCY = (RampStep, SpeedsStep, LimitStep)
 NEEDS_REFERENCE = (RampStep, SpeedsStep)
 STOP_METHODS = ("stop", "quick-stop", "freewheel", "emergency-stop")
-_AT = re.compile(r" \(at line (\d+), column \d+\)")
 
 
 class AcceptanceFileError(DriveError):
@@ -83,17 +78,7 @@ class AcceptanceFile:
 
 def read_test(path: Path) -> AcceptanceFile:
     """Read and check a test file and the sets that it names. Raises AcceptanceFileError."""
-    try:
-        text = read_small_text(path)
-        tables = toml_tables(text)
-    except OSError as error:
-        raise AcceptanceFileError(f"{path}: cannot be read: {error.strerror or error}.") from error
-    except UnicodeDecodeError as error:
-        raise AcceptanceFileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
-    except tomli.TOMLDecodeError as error:
-        found = _AT.search(str(error))
-        place = f"{path}:{found[1]}" if found else f"{path}"
-        raise AcceptanceFileError(f"{place}: {_AT.sub('', str(error))}.") from error
+    text, tables = read_person_file(path, AcceptanceFileError)
     return _Checked(path, text, tables).file()
 
 
@@ -166,22 +151,7 @@ class _Checked:
     def _raise(self) -> None:
         if not self.faults:
             return
-        lines = toml_lines(self.text)
-        rows = sorted((self._line(lines, path), path, fault) for path, fault in self.faults)
-        raise AcceptanceFileError(
-            "\n".join(f"{self.path}:{line}: {_key(path)}{fault}." for line, path, fault in rows)
-        )
-
-    @staticmethod
-    def _line(lines: Mapping[TomlPath, int], path: TomlPath) -> int:
-        """Return the line of a path, or of the nearest table around it."""
-        return next(lines[path[:n]] for n in range(len(path), -1, -1) if path[:n] in lines)
-
-
-def _key(path: TomlPath) -> str:
-    """Return a path as a person counts: the third step is `step 3`."""
-    parts = [f"step {p + 1}" if isinstance(p, int) else p for p in path if p != STEPS_KEY]
-    return f"{', '.join(parts)}: " if parts else ""
+        raise_faults(self.path, self.text, self.faults, {STEPS_KEY: "step"}, AcceptanceFileError)
 
 
 def step_faults(step: AcceptanceStep, profile: Profile) -> Iterator[tuple[str, str]]:
