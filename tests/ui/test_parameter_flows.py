@@ -530,6 +530,9 @@ async def test_quitting_offers_to_save_what_is_not_in_eeprom() -> None:
         await made.pilot.press("y")
         await message(made, "saved to EEPROM")
         assert not screen.session.unsaved
+        await until(made.pilot, lambda: bool(screen.editor.eeprom and screen.editor.eeprom.last))
+        await made.pilot.press("S")
+        await until(made.pilot, lambda: "1 write from this computer" in picture(made.app))
 
 
 async def test_s_in_write_results_asks_to_save() -> None:

@@ -15,7 +15,7 @@ import time
 import weakref
 from collections import deque
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
@@ -23,6 +23,7 @@ from typing import Literal
 from tui.drive.plain import escaped_json
 from tui.drive.sentences import counted
 
+from .eeprom_counts import EepromCounts, EepromWrite
 from .journal_file import JournalFile
 from .paths import state_folder
 
@@ -36,6 +37,8 @@ IDLE_ENDS_AFTER = 10.0
 """Seconds without an entry after which the thread ends; the next entry begins another."""
 SLOW = 5.0
 """Seconds in which a disk must accept an entry, else it counts as hanging."""
+COUNTED_AT_ONCE = 50
+"""EEPROM writes that are added to their file at once, while more entries wait."""
 JOURNAL_PATIENCE = 3.0
 """Seconds that a reader or the end of the program waits for the disk."""
 
@@ -70,6 +73,10 @@ class Entry:
     `reset` set the drive's own counters to 0, by the function that `code` names."""
     of: str = ""
     """The time of the write that a `read-back` completes."""
+    drive: str = ""
+    """Identity that the drive reported, if the write is counted."""
+    eeprom: Literal["", "write", "save"] = ""
+    """`write` if the drive may have stored the value in its EEPROM, `save` if all settings."""
 
 
 FAULT_WHYS = {
@@ -92,7 +99,11 @@ class Journal:
     def __init__(
         self, folder: Path | None = None, on_trouble: Callable[[str], None] | None = None
     ) -> None:
-        self._file = JournalFile(folder or state_folder())
+        folder = folder or state_folder()
+        self._file = JournalFile(folder)
+        self.eeprom = EepromCounts(folder)
+        self._uncounted: list[EepromWrite] = []
+        """Writes that are not in `eeprom` yet; of the journal's thread."""
         self._on_trouble = on_trouble
         self._changed = threading.Condition()
         """Guards the fields below; never held during disk work."""
@@ -164,6 +175,8 @@ class Journal:
 
         `sent` is False for a write that was refused before its frame.
         """
+        if entry.eeprom and not sent:
+            entry = replace(entry, eeprom="")
         with self._changed:
             if sent and entry.kind in ("write", "reset"):
                 self._sent.append(entry)
@@ -288,7 +301,26 @@ class Journal:
         except Exception as error:
             log.exception("the journal")
             return str(error) or type(error).__name__
+        self._count(entry)
         return ""
+
+    def _count(self, entry: Entry) -> None:
+        """Count a write to an EEPROM, together with those that follow; never raise."""
+        if entry.eeprom and entry.kind == "write":
+            code = entry.code if entry.eeprom == "write" else ""
+            place = (entry.line, entry.device, entry.profile, entry.drive, code)
+            self._uncounted.append(EepromWrite(*place, time.time()))
+        with self._changed:
+            more = any(waiting.eeprom for waiting in self._waiting)
+        if not self._uncounted or (more and len(self._uncounted) < COUNTED_AT_ONCE):
+            return
+        try:
+            self.eeprom.add(self._uncounted)
+        except Exception as error:
+            log.warning("%d EEPROM writes are not counted yet: %s", len(self._uncounted), error)
+            del self._uncounted[:-JOURNAL_BACKLOG]
+        else:
+            self._uncounted.clear()
 
 
 def _tell(before: str, why: str, took: float, left: int, lost: int) -> None:

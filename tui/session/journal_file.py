@@ -59,7 +59,7 @@ class JournalFile:
         line = text.encode("utf-8", "backslashreplace") + b"\n"
         tried, self._tried = self._tried, line
         make_folder(self.path.parent)
-        with self._turn() as alone:
+        with folder_turn(self.path.parent) as alone:
             if alone:
                 self._rotate(len(line))
             # opened for each line: another program may have begun the next file meanwhile
@@ -104,17 +104,18 @@ class JournalFile:
                 younger.replace(older)
         sync_folder(self.path.parent)
 
-    @contextmanager
-    def _turn(self) -> Iterator[bool]:
-        """Make other programs wait; yield False if one keeps its lock too long."""
-        if fcntl is None:
-            yield True
-            return
-        folder = os.open(self.path.parent, os.O_RDONLY | os.O_CLOEXEC)
-        try:
-            yield _locked(folder)
-        finally:
-            os.close(folder)
+
+@contextmanager
+def folder_turn(folder: Path) -> Iterator[bool]:
+    """Make other programs wait for a folder; yield False if one keeps its lock too long."""
+    if fcntl is None:
+        yield True
+        return
+    handle = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
+    try:
+        yield _locked(handle)
+    finally:
+        os.close(handle)
 
 
 def _locked(folder: int) -> bool:

@@ -246,9 +246,11 @@ async def _restore(
 ) -> tuple[_Restored, int]:
     from tui.bus.errors import RequestRefused
     from tui.drive.profile import library
-    from tui.session.settings.eeprom import save_to_eeprom
+    from tui.session.settings.eeprom import refuse_frequent_save, save_to_eeprom
     from tui.session.settings.restore import Mark, plan_for
     from tui.session.settings.restore import restore_set as bring_back
+
+    from ..running.wear import wear_gate
 
     source, messages = library.load(values.head.profile), telling.messages
     if session.line.read_only:
@@ -262,16 +264,19 @@ async def _restore(
         messages.tell(interrupted_before)
     journal, permit = journal_document(), permit_of(session)
     try:
+        gate = wear_gate(journal, options.confirmed, messages)
+        if save:
+            await refuse_frequent_save(session, gate)
         done = await bring_back(
             session, journal, values, source, options, permit=permit,
-            progress=telling, reading=counter("Read"),
+            progress=telling, reading=counter("Read"), gate=gate,
         )  # fmt: skip
         say_plan_left_out(done.plan, messages)
         for link in done.links:
             messages.tell(link.text)
         saved = save and done.complete
         if saved:
-            messages.tell(await save_to_eeprom(session, journal, permit))
+            messages.tell(await save_to_eeprom(session, journal, permit, gate))
         say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
         text = _WROTE if written else _WROTE_NOTHING

@@ -203,7 +203,9 @@ async def _write(
 ) -> tuple[_Written, int]:
     """Write, report each; the results for JSON, and the exit status."""
     from tui.session.settings.apply import apply_edits
-    from tui.session.settings.eeprom import save_to_eeprom
+    from tui.session.settings.eeprom import refuse_frequent_save, save_to_eeprom
+
+    from ..running.wear import wear_gate
 
     messages = telling.messages
     if not len(edits):
@@ -212,14 +214,17 @@ async def _write(
             return {"results": [], "saved": False, "after_reset": [], "unsaved": []}, DONE
     journal, permit = journal_document(), permit_of(session)
     try:
+        gate = wear_gate(journal, confirmed, messages)
+        if save:
+            await refuse_frequent_save(session, gate)
         done = await apply_edits(
-            session, journal, edits, permit=permit, confirmed=confirmed, progress=telling
+            session, journal, edits, permit=permit, confirmed=confirmed, progress=telling, gate=gate
         )
         for link in done.links:
             messages.tell(link.text)
         saved = save and len(done.written) == len(done.results) and not done.stopped
         if saved:
-            messages.tell(await save_to_eeprom(session, journal, permit))
+            messages.tell(await save_to_eeprom(session, journal, permit, gate))
         say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
     finally:
         close_journal(journal)

@@ -20,6 +20,7 @@ from .document import Document, DocumentPart, DriveDocument, TimeoutField
 from .parts import (
     AlarmField,
     ControlField,
+    EepromField,
     FaultField,
     FirstWordField,
     HeardField,
@@ -101,6 +102,7 @@ class StatusDocument(DriveDocument, kw_only=True):
     words: dict[str, StatusWordField | None]
     values: dict[str, ValueField | None]
     unread: list[str]
+    eeprom: EepromField | None
 
 
 class RunDocument(Document, kw_only=True):

@@ -27,6 +27,11 @@ class JournalEntryField(DocumentPart):
     why: str
     kind: Literal["write", "fault", "read-back", "proof", "reset"]
     of: str
+    drive: str
+    eeprom: Annotated[
+        Literal["", "write", "save"],
+        Meta(description="`write` if the value may go to EEPROM, `save` if all settings do."),
+    ]
 
 
 class DamagedLineField(DocumentPart):

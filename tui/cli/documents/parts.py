@@ -223,6 +223,28 @@ class ControlField(DocumentPart):
     give_back: str | None
 
 
+class EepromCountField(DocumentPart):
+    """Writes to EEPROM from this computer, of one parameter or of all settings."""
+
+    count: int
+    first: str | None
+    last: str | None
+    last_hour: int
+    frequent: Annotated[bool, Meta(description="True if the next write is warned about.")]
+
+
+class EepromField(DocumentPart):
+    """Writes to the EEPROM of a drive from this computer."""
+
+    life: Annotated[
+        int | None, Meta(description="Writes that it lasts for; null if no document states it.")
+    ]
+    saves: EepromCountField
+    writes: Annotated[
+        dict[str, EepromCountField], Meta(description="By code: parameters written one by one.")
+    ]
+
+
 class OldTimeoutField(DocumentPart):
     """The communication timeout in the older form of `status`; `timeout` replaces it."""
 

@@ -13,6 +13,7 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.session.patience import patience
 
 from .control import control_field, control_row
+from .eeprom_output import eeprom_counts, eeprom_field, eeprom_rows
 from .errors import DONE, LINE_TROUBLE
 from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
+    from tui.session.eeprom_counts import DriveCounts
     from tui.session.reading import Reading
     from tui.session.timeout_report import Timeout, TimeoutWatch
 
@@ -82,6 +84,8 @@ class Status:
     """Probable causes of its fault or alarm; None without either."""
     unread: Sequence[str] = ()
     """Codes of words that could not be read in time."""
+    eeprom: DriveCounts | None = None
+    """Writes to its EEPROM; None if they cannot be read."""
 
     @property
     def status(self) -> int:
@@ -166,8 +170,9 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     refused = _refused(session)
     left = await asyncio.to_thread(left_behind, session, state.motion)
     return Status(
-        session, state, readings, channels, switches, refused, watch, timeout, left, finding, unread
-    )
+        session, state, readings, channels, switches, refused, watch, timeout, left, finding,
+        unread, await eeprom_counts(session, fleet.journal),
+    )  # fmt: skip
 
 
 def _codes(profile: Profile) -> list[str]:
@@ -251,6 +256,7 @@ def status_document(line_text: str, status: Status) -> StatusDocument:
         words=word_fields(status.session.profile, status.readings),
         values=shown_fields(status.session.profile, status.readings),
         unread=list(status.unread),
+        eeprom=eeprom_field(status.session, status.eeprom),
     )
 
 
@@ -292,6 +298,7 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         *control_row(status.session),
         *word_rows(profile, status.readings),
         *shown_values(profile, status.readings).items(),
+        *eeprom_rows(status.session, status.eeprom),
         *([("Not read", ", ".join(status.unread))] if status.unread else []),
     ]
 

@@ -50,7 +50,7 @@ confirm_option = click.option(
     multiple=True,
     metavar="CODE",
     shell_complete=complete_code,
-    help="Write this unverified parameter after a keypad check.",
+    help="Write this unverified or often written parameter.",
 )
 save_option = click.option(
     "--save", is_flag=True, help="Save the settings to the drive's EEPROM at the end."

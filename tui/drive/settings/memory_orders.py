@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from ..errors import DriveError
 from ..profile.profile import Profile
-from ..profile.schema import MemoryOrder
+from ..profile.schema import MemoryOrder, Parameter
+from .writable import is_setting
 
 
 class MemoryRefused(DriveError):
@@ -35,3 +38,20 @@ def factory_order(profile: Profile) -> MemoryOrder:
         f"No available document says which word of {profile.name} restores the factory settings."
         " Use its keypad, or restore a parameter set."
     )
+
+
+def eeprom_use(profile: Profile, parameter: Parameter, raw: int) -> Literal["", "write", "save"]:
+    """Return what a write of a raw value stores in the EEPROM: nothing, the parameter, or all.
+
+    A setting that is stored in an unknown way counts as one that goes to EEPROM.
+    """
+    memory, raws = profile.data.memory, {parameter.code: raw & 0xFFFF}
+    saved_by = memory.save
+    if saved_by is not None and saved_by.parameter == parameter.code:
+        wanted = saved_by.raw & 0xFFFF
+        if (raw & wanted == wanted) if saved_by.bit else (raw & 0xFFFF == wanted):
+            return "save"
+    if any(when.holds(raws) for when in memory.eeprom.also_saved_by):
+        return "save"
+    stored = parameter.storage in ("eeprom", "unknown") and is_setting(profile, parameter)
+    return "write" if stored else ""

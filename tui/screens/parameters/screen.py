@@ -65,6 +65,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     def on_mount(self) -> None:
         """Start reading."""
         self.editor.values.start()
+        self.run_worker(self.editor.recount(), exit_on_error=False)
         self.call_after_refresh(self.list_again)
 
     def on_unmount(self) -> None:

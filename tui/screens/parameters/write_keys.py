@@ -170,6 +170,7 @@ def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
     reported += [r.text for e in order if (r := editor.refusal(e.code)) is not None]
     reported += [edit.warning for edit in order if edit.warning]
     reported += consequences(profile, chosen, raws, editor.values.lacking)
+    reported += editor.wear_text(order).splitlines()
     reported += [
         f"{e.code} changes the drive's line settings. It then answers only at the new settings."
         for e in order
@@ -231,7 +232,8 @@ class WriteKeys(ParameterKeys):
             self._refuse(str(refused))
             return
         if self._require_armed():
-            self._ask(question, order.does, yes, "Cancel", work)
+            wear = self.editor.wear_text() if work == self.editor.save else ""
+            self._ask(question, "\n".join(filter(None, (order.does, wear))), yes, "Cancel", work)
 
     def show_results(self) -> None:
         """Show once the result of each edit; if one failed, ask before writing the rest."""

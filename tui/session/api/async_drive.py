@@ -32,15 +32,19 @@ class AsyncDrive(ScriptedDrive):
         finally:
             feed.close()
 
-    async def write(self, values: Mapping[str, object], *, rounded: bool = False) -> dict[str, str]:
+    async def write(
+        self, values: Mapping[str, object], *, rounded: bool = False, often: bool = False
+    ) -> dict[str, str]:
         """As `Drive.write`."""
         calls, permit = self._calls, self._calls.permit()
-        return await awaited(calls.line, lambda: calls.write(values, permit, rounded=rounded))
+        return await awaited(
+            calls.line, lambda: calls.write(values, permit, rounded=rounded, often=often)
+        )
 
-    async def save(self) -> str:
+    async def save(self, *, often: bool = False) -> str:
         """As `Drive.save`."""
         permit = self._calls.permit()
-        return await awaited(self._calls.line, lambda: self._calls.save(permit))
+        return await awaited(self._calls.line, lambda: self._calls.save(permit, often=often))
 
     def running(self, reference: str | None = None, *, reverse: bool = False) -> AsyncRunningMotor:
         """As `Drive.running`, for `async with`."""

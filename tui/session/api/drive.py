@@ -58,19 +58,26 @@ class Drive(ScriptedDrive):
         finally:
             feed.close()
 
-    def write(self, values: Mapping[str, object], *, rounded: bool = False) -> dict[str, str]:
+    def write(
+        self, values: Mapping[str, object], *, rounded: bool = False, often: bool = False
+    ) -> dict[str, str]:
         """Write settings, each read back: numbers in the parameter's unit, or as they are typed.
 
         Returns the results, by code. Raises NotWritten where one was not, WouldRound where the
-        drive can hold only another value and `rounded` is not given, and other DriveErrors.
+        drive can hold only another value and `rounded` is not given, and other DriveErrors. A
+        parameter that went to EEPROM 10 times in the last hour is written only with `often`.
         """
         calls, permit = self._calls, self._calls.permit()
-        return waited(calls.line, lambda: calls.write(values, permit, rounded=rounded))
+        return waited(calls.line, lambda: calls.write(values, permit, rounded=rounded, often=often))
 
-    def save(self) -> str:
-        """Keep the settings in the drive's EEPROM; armed. Returns what was done."""
+    def save(self, *, often: bool = False) -> str:
+        """Keep the settings in the drive's EEPROM; armed. Returns what was done.
+
+        After 10 saves in the last hour, or near the end of the EEPROM's life, another one raises
+        DriveError unless `often` is given.
+        """
         permit = self._calls.permit()
-        return waited(self._calls.line, lambda: self._calls.save(permit))
+        return waited(self._calls.line, lambda: self._calls.save(permit, often=often))
 
     def running(self, reference: str | None = None, *, reverse: bool = False) -> RunningMotor:
         """Run the motor for a `with` block, which stops it at every end; armed.

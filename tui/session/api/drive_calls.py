@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import math
 from collections import deque
 from collections.abc import Iterator, Mapping
@@ -26,9 +27,12 @@ from ..running.errors import NotStopped
 from ..settings.apply import apply_edits
 from ..settings.eeprom import save_to_eeprom
 from ..settings.typed import stage_typed
+from ..settings.wear import WearGate, agreed
 from ..work import Permit
 from .guarded_run import GuardedRun, GuardedRuns
 from .values import DriveValue, NotWritten, Sample, value_from
+
+log = logging.getLogger(__name__)
 
 SHORTEST_CYCLE, LONGEST_CYCLE = 0.05, 86400.0
 """Seconds of a cycle of `Drive.watch`."""
@@ -130,7 +134,7 @@ class DriveCalls:
         return self.session.work.permit()
 
     async def write(
-        self, values: Mapping[str, object], permit: Permit, *, rounded: bool
+        self, values: Mapping[str, object], permit: Permit, *, rounded: bool, often: bool
     ) -> dict[str, str]:
         """Write settings, each read back; the results by code. Raises as `Drive.write`."""
         typed = [(self.session.profile.find(code).code, str(v)) for code, v in values.items()]
@@ -138,14 +142,23 @@ class DriveCalls:
             raise DriveError("One parameter is given more than once. Which value is meant?")
         edits, _ = await stage_typed(self.session, typed, rounded=rounded)
         journal = self.fleet.journal
-        done = await apply_edits(self.session, journal, edits, permit=permit, why="script")
+        gate = self._gate(often=often)
+        done = await apply_edits(
+            self.session, journal, edits, permit=permit, why="script", gate=gate
+        )
         if missed := {r.edit.code: r.text for r in done.results if not r.done}:
             raise NotWritten(missed)
         return {result.edit.code: result.text for result in done.results}
 
-    async def save(self, permit: Permit) -> str:
+    async def save(self, permit: Permit, *, often: bool) -> str:
         """Keep the settings in the drive's EEPROM; returns what was done."""
-        return await save_to_eeprom(self.session, self.fleet.journal, permit)
+        gate = self._gate(often=often)
+        return await save_to_eeprom(self.session, self.fleet.journal, permit, gate)
+
+    def _gate(self, *, often: bool) -> WearGate:
+        ask = agreed if often else None
+        way = "Pass often=True to write it anyway."
+        return WearGate(self.fleet.journal.eeprom, ask=ask, warn=log.warning, way=way)
 
     def run(self, direction: Direction, reference: str | None) -> GuardedRun:
         """Prepare a run of the motor; nothing is sent before it begins."""

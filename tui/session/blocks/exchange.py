@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, LineError, RequestRefused
@@ -145,6 +145,7 @@ class _Exchange:
         """Exchange the words, read the parameters back, and record both in the journal."""
         words = [to_words(parameter, raws[parameter.code])[0] for parameter in self.targets]
         answer, back, lost, sent = "ok", dict[str, int](), False, True
+        refused = False
         image = self.session.image
         before = {p.code: image.get(p.code) for p in self.targets}
         for code in before:
@@ -158,7 +159,8 @@ class _Exchange:
                 image.believe(code, held_before)
             raise
         except LineError as error:
-            answer, lost = str(error), not isinstance(error, DeviceException)
+            refused = isinstance(error, DeviceException)
+            answer, lost = str(error), not refused
             raise
         except asyncio.CancelledError:
             answer, lost = CUT_SHORT, True
@@ -167,6 +169,8 @@ class _Exchange:
             self.session.note_command()
             for parameter in self.targets:
                 entry = self._record(parameter, held, raws, answer, back)
+                if refused:
+                    entry = replace(entry, eeprom="")
                 self.writer.journal.add(entry, sent=sent)
                 if lost:
                     self.writer.complete_later(entry, parameter)

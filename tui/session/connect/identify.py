@@ -41,6 +41,11 @@ class DriveIdentity:
     """Ids of all profiles that may fit, best first."""
 
     @property
+    def text(self) -> str:
+        """Vendor, reference and name as one text; empty if it reports none of them."""
+        return " ".join(filter(None, (self.vendor, self.reference, self.name)))
+
+    @property
     def version_text(self) -> str:
         """The version as shown to a person."""
         return library.version_shown(self.profile, self.version)

@@ -8,7 +8,7 @@ from functools import partial
 from typing import NoReturn
 
 from tui.bus.api import Priority
-from tui.bus.errors import LineError, RequestRefused
+from tui.bus.errors import DeviceException, LineError, RequestRefused
 from tui.bus.gateway.pdu import (
     BUSY,
     ILLEGAL_FUNCTION,
@@ -225,7 +225,7 @@ class GatewayWrite:
         before = {
             parameter.code: self._session.image.get(parameter.code) for parameter in parameters
         }
-        answer = ENDED_BEFORE_ANSWER
+        answer, stored = ENDED_BEFORE_ANSWER, True
         try:
             pdu = await self._exchange(priority, parameters)
             answer = "ok"
@@ -233,12 +233,12 @@ class GatewayWrite:
                 self._line.keep_resting(self._session)
             return pdu
         except LineError as error:
-            answer = str(error)
+            answer, stored = str(error), not isinstance(error, RequestRefused | DeviceException)
             if isinstance(error, RequestRefused):
                 raise Unanswerable(self._refusal_code(), answer) from error
             raise
         finally:
-            self._keep(parameters, before, answer, "stop" if stops else "write")
+            self._keep(parameters, before, answer, "stop" if stops else "write", stored=stored)
 
     async def _exchange(self, priority: Priority, parameters: list[Parameter]) -> bytes:
         session, requested = self._session, self._requested
@@ -285,8 +285,13 @@ class GatewayWrite:
         before: Mapping[str, Reading | None],
         answer: str,
         what: str,
+        *,
+        stored: bool = True,
     ) -> None:
-        """Record each parameter whose words were all written in the journal."""
+        """Record each parameter whose words were all written in the journal.
+
+        `stored` is False if the drive did not take them.
+        """
         session, words = self._session, self._requested.words
         why = f"{what} of Modbus TCP client {self._client}"
         for parameter in parameters:
@@ -296,5 +301,7 @@ class GatewayWrite:
             held = before.get(parameter.code)
             old, new = held.raw if held else None, from_words(parameter, [words[at] for at in own])
             self._line.journal.add(
-                parameter_entry(session, parameter, old=old, new=new, answer=answer, why=why)
+                parameter_entry(
+                    session, parameter, old=old, new=new, answer=answer, why=why, refused=not stored
+                )
             )

@@ -32,6 +32,7 @@ from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
 from ..work import Permit, Stopped
 from .applied import Applied, EditOutcome, LinkChange, Result, WriteProgress, link_change
+from .wear import WearGate
 from .write import NotTaken, Writer, device_refusal
 
 LOST_ANSWERS = (NoAnswer, ChecksumFault, WrongReply)
@@ -47,20 +48,22 @@ async def apply_edits(
     why: str = "setting",
     progress: WriteProgress | None = None,
     ask_after_failure: bool = False,
+    gate: WearGate | None = None,
 ) -> Applied:
     """Write staged edits in their order, as long as the permit holds.
 
     If one fails, those that depend on it are not written. With `ask_after_failure` the others are
     not written either, but listed in `Applied.waits`, so that a person can be asked first.
     `confirmed` are codes of unverified parameters that the user has confirmed; `why` is the reason
-    in the journal. Raises RequestRefused on a read-only line, and the line's errors as long as
-    nothing was written.
+    in the journal. `gate` decides about frequent writes to EEPROM (default: they are refused).
+    Raises RequestRefused on a read-only line, and the line's errors as long as nothing was written.
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
     work = _Work(
-        session, Writer(session, journal, permit), RetryingReader(session), edits, confirmed, why
-    )
+        session, Writer(session, journal, permit), RetryingReader(session), edits, confirmed, why,
+        gate or WearGate(journal.eeprom, confirmed),
+    )  # fmt: skip
     await work.look_at_all()
     reported = edit_problems(session.profile, edits, work.retrying.raws)
     order = ordered(session.profile, edits, work.retrying.raws)
@@ -91,6 +94,7 @@ class _Work:
     edits: Edits
     confirmed: Collection[str]
     why: str
+    gate: WearGate
     stopped: str = ""
     voided: bool = False
     """True if a stop or the end of arming has ended it."""
@@ -183,6 +187,8 @@ class _Work:
             return Result(edit, EditOutcome.DONE, text, held, unchanged=True)
         if not self._means(edit) or (edit.old is not None and held != edit.old):
             return Result(edit, EditOutcome.CHANGED, self._changed_text(edit, held), held)
+        if worn := await self.gate.refusal(self.session, parameter, edit.new):
+            return Result(edit, EditOutcome.REFUSED, worn, held)
         return None
 
     def _means(self, edit: Edit) -> bool:

@@ -6,6 +6,7 @@ drive, in the line's loop. Everything else belongs to the thread of the screen.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
@@ -17,6 +18,8 @@ from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import StateKind
 from tui.drive.sentences import first_of
+from tui.drive.settings.edits import Edit
+from tui.drive.settings.memory_orders import eeprom_use
 from tui.drive.settings.parameter_set import ParameterSet
 from tui.drive.settings.restore_plan import RestorePlan
 from tui.drive.settings.selection import FilterContext
@@ -24,6 +27,7 @@ from tui.drive.settings.writable import Refusal, write_refusal
 
 from ..drive import DriveSession
 from ..drive_state import DriveState
+from ..eeprom_counts import DriveCounts
 from ..journal import Journal
 from ..paths import state_folder
 from ..read.retrying_reader import RetryingReader
@@ -34,6 +38,7 @@ from .apply import apply_edits
 from .eeprom import factory_reset, save_to_eeprom
 from .staging import Staging
 from .watched_values import WatchedValues
+from .wear import WearGate, agreed, read_counts, wear_of
 
 RECENT_KEPT = 30
 STORED_KEYS = {"favorites": "favourites", "confirmed": "confirmed", "recent": "recent"}
@@ -109,6 +114,8 @@ class Editor:
     marks: Marks = field(init=False)
     other: Mapping[str, int] = field(default_factory=dict)
     other_label: str = "factory"
+    eeprom: DriveCounts | None = None
+    """Writes to its EEPROM; None until they are read."""
     source: ParameterSet | None = None
     """The parameter set with which the drive is compared; None without one."""
 
@@ -187,6 +194,42 @@ class Editor:
 
     # Writing
 
+    async def recount(self) -> None:
+        """Read how often the drive's EEPROM was written; a file that cannot be read is ignored."""
+        with suppress(OSError, ValueError):
+            self.eeprom = await read_counts(self.session, self.journal.eeprom)
+
+    def wear_text(self, edits: Sequence[Edit] | None = None) -> str:
+        """Return how often the EEPROM was written, for a question: by saves, or by these edits.
+
+        Of edits, only those that go to EEPROM frequently are reported.
+        """
+        if self.eeprom is None:
+            return ""
+        if edits is None:
+            wear = wear_of(self.session, self.eeprom, "")
+            return f"EEPROM: {wear.text}" if wear.count else ""
+        profile = self.session.profile
+        codes = [e.code for e in edits if eeprom_use(profile, profile[e.code], e.new) == "write"]
+        wears = {code: wear_of(self.session, self.eeprom, code) for code in codes}
+        return "\n".join(
+            f"EEPROM, {c}: {wear.text}" for c, wear in wears.items() if wear.is_frequent
+        )
+
+    def _count_again(self) -> None:
+        """Read the counts once the journal has them; nothing waits for that."""
+
+        async def work() -> None:
+            await asyncio.to_thread(self.journal.flush)
+            await self.recount()
+
+        with suppress(LineError):
+            self.session.line.spawn(work, f"EEPROM writes {self.session.device}")
+
+    @property
+    def _gate(self) -> WearGate:
+        return WearGate(self.journal.eeprom, ask=agreed)
+
     def apply(self, codes: tuple[str, ...] = (), stamp: int | None = None) -> None:
         """Write the staged edits (default: all); return immediately."""
         staging = self.staging
@@ -203,10 +246,12 @@ class Editor:
                 confirmed=self.marks.confirmed,
                 progress=self._progress,
                 ask_after_failure=True,
+                gate=self._gate,
             )
             staging.take_left((*applied.left.requested, *held_back))
             self.applied = applied
             self._applied(applied)
+            self._count_again()
             return _summary(applied, [edit.code for edit in staging.edits])
 
         self._run(work, stamp, self._cut_short)
@@ -250,8 +295,9 @@ class Editor:
         """Copy the settings to the EEPROM, if the family needs that."""
 
         async def work(permit: Permit) -> str:
-            done = await save_to_eeprom(self.session, self.journal, permit)
+            done = await save_to_eeprom(self.session, self.journal, permit, self._gate)
             self.session.unsaved_settings.clear()
+            self._count_again()
             return done
 
         self._run(work, stamp)

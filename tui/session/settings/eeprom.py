@@ -18,6 +18,7 @@ from ..drive import DriveSession
 from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
 from ..work import Permit
+from .wear import WearGate
 from .write import Writer, device_refusal
 
 SAVING_LONGEST = 10.0
@@ -27,13 +28,25 @@ SETTINGS_NAMED = 8
 """Number of settings that a text names at most."""
 
 
-async def save_to_eeprom(session: DriveSession, journal: Journal, permit: Permit) -> str:
+async def refuse_frequent_save(session: DriveSession, gate: WearGate) -> None:
+    """Raise MemoryRefused if saves are so frequent that `gate` does not let one pass."""
+    if (order := session.profile.data.memory.save) is not None:
+        parameter = session.profile[order.parameter]
+        if worn := await gate.refusal(session, parameter, order.raw):
+            raise MemoryRefused(worn)
+
+
+async def save_to_eeprom(
+    session: DriveSession, journal: Journal, permit: Permit, gate: WearGate | None = None
+) -> str:
     """Copy the settings to the EEPROM, wait until the drive is done, and return the result as text.
 
-    Raises MemoryRefused (wrong state, or the family needs or has no such command), DeviceException
-    with the meaning of the drive's refusal, and the line's other errors.
+    `gate` decides about frequent saves (default: they are refused). Raises MemoryRefused (wrong
+    state, too frequent, or the family needs or has no such command), DeviceException with the
+    meaning of the drive's refusal, and the line's other errors.
     """
     order = save_order(session.profile)
+    await refuse_frequent_save(session, gate or WearGate(journal.eeprom))
     writer = Writer(session, journal, permit)
     await _carry_out(writer, order, why="save to EEPROM", confirmed={order.parameter})
     return f"{session.profile.name}: the settings are saved to EEPROM."

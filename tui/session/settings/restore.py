@@ -27,6 +27,7 @@ from ..stored import store_json, stored_json
 from ..work import Permit
 from .applied import Applied, LinkChange, Result, WriteProgress
 from .apply import apply_edits
+from .wear import WearGate
 
 PASSES = 5
 """Maximum number of planning passes: some settings change others when written."""
@@ -74,8 +75,11 @@ async def restore_set(
     permit: Permit,
     progress: WriteProgress | None = None,
     reading: ReadProgress | None = None,
+    gate: WearGate | None = None,
 ) -> Restored:
     """Write the settings that differ, read them back, and plan again until none differs.
+
+    `gate` decides about frequent writes to EEPROM (default: they are refused).
 
     Raises the line's errors as long as nothing was written.
     """
@@ -92,7 +96,7 @@ async def restore_set(
         if not len(left):
             break
         try:
-            applied = await _one_pass(session, journal, plan, options, permit, progress)
+            applied = await _one_pass(session, journal, plan, options, permit, progress, gate)
             results.update({result.edit.code: result for result in applied.results})
             links += applied.links
             stopped, left = applied.stopped, applied.left
@@ -140,6 +144,7 @@ async def _one_pass(
     options: Options,
     permit: Permit,
     progress: WriteProgress | None,
+    gate: WearGate | None,
 ) -> Applied:
     return await apply_edits(
         session,
@@ -149,6 +154,7 @@ async def _one_pass(
         permit=permit,
         why="restore",
         progress=progress,
+        gate=gate,
     )
 
 

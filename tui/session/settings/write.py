@@ -13,6 +13,7 @@ from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.sentences import sentence
+from tui.drive.settings.memory_orders import eeprom_use
 from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, is_field, to_words, word_count
 
@@ -103,8 +104,9 @@ class Writer:
                 if sent and not refused and parameter.storage == "ram-until-saved":
                     self._note_unsaved(parameter, old, back)
                 entry = parameter_entry(
-                    session, parameter, old=old, new=raw, answer=answer, why=why, read_back=back
-                )
+                    session, parameter, old=old, new=raw, answer=answer, why=why, read_back=back,
+                    refused=refused,
+                )  # fmt: skip
                 self.journal.add(entry, sent=sent)
                 if lost:
                     self.complete_later(entry, parameter, check if read_back else 0)
@@ -202,8 +204,13 @@ def parameter_entry(
     answer: str,
     why: str,
     read_back: int | None = None,
+    refused: bool = False,
 ) -> Entry:
-    """Make the journal entry of a write, with raw values before, after, and read back."""
+    """Make the journal entry of a write, with raw values before, after, and read back.
+
+    `refused` is True if the drive refused it, so that its EEPROM holds what it held.
+    """
+    use = "" if refused else eeprom_use(session.profile, parameter, new)
     return Entry(
         time=now_text(),
         line=session.line_text,
@@ -218,6 +225,8 @@ def parameter_entry(
         answer=answer,
         read_back=read_back,
         why=why,
+        drive=session.known_identity.text if use else "",
+        eeprom=use,
     )
 
 

@@ -62,8 +62,7 @@ class TaughtDrive:
         cls, line_text: str, device: int, profile: str, identity: DriveIdentity | None
     ) -> TaughtDrive:
         """Return the key for a device on a line; equivalent spellings of the line are the same."""
-        stated = (identity.vendor, identity.reference, identity.name) if identity else ()
-        return cls(line_key(line_text), device, profile, " ".join(part for part in stated if part))
+        return cls(line_key(line_text), device, profile, identity.text if identity else "")
 
     @property
     def file(self) -> Path:

@@ -153,12 +153,7 @@ def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
         for place, code in enumerate(watch.other_timeouts):
             yield ("communication_fault", "other_timeouts", place), code
         yield ("communication_fault", "reaction"), watch.reaction
-    for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
-        if order is not None:
-            yield ("memory", key, "parameter"), order.parameter
-            yield ("memory", key, "groups"), order.groups
-            if order.done:
-                yield ("memory", key, "done"), order.done.parameter
+    yield from _memory_names(data)
     for index, step in enumerate(data.start_up):
         for place, code in enumerate(step.parameters):
             yield ("start_up", index, "parameters", place), code
@@ -169,6 +164,17 @@ def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
     yield ("identification", "class_parameter"), data.identification.class_parameter
     for place, server in enumerate(data.addresses.servers):
         yield ("addresses", "servers", place, "parameter"), server.parameter
+
+
+def _memory_names(data: ProfileData) -> Iterator[NamedPlace]:
+    for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
+        if order is not None:
+            yield ("memory", key, "parameter"), order.parameter
+            yield ("memory", key, "groups"), order.groups
+            if order.done:
+                yield ("memory", key, "done"), order.done.parameter
+    for place, when in enumerate(data.memory.eeprom.also_saved_by):
+        yield ("memory", "eeprom", "also_saved_by", place), when.parameter
 
 
 def own_id(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:

@@ -68,11 +68,23 @@ class MemoryOrder(Table, frozen=True, kw_only=True):
     source: str = ""
 
 
+class Eeprom(Table, frozen=True, kw_only=True):
+    """Endurance of a drive's EEPROM."""
+
+    writes: Annotated[int, Meta(ge=1)] | None = None
+    """Number of writes that it lasts for; absent if no document states it."""
+    also_saved_by: list[When] = []
+    """Words besides `save` that store all settings when they get these values."""
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
 class MemoryOrders(Table, frozen=True, kw_only=True):
     """Commands to a drive's memory; unknown ones are omitted."""
 
     save: MemoryOrder | None = None
     factory: MemoryOrder | None = None
+    eeprom: Eeprom = Eeprom()
     busy_mask: RawWord = 0
     """Bits of the extended status word that are 1 while the EEPROM is written."""
 
