@@ -776,3 +776,24 @@ def test_request_is_sent_with_what_is_known_of_its_drive() -> None:
     here.facts.give_stop([1], "the stop key")
     with pytest.raises(Exception, match="a stop came after it"):
         found.look()
+
+
+@pytest.mark.parametrize(("word", "unknown"), [(None, False), (7, True)])
+async def test_internal_error_in_judging_a_reply_fails_its_request(
+    word: int | None, unknown: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its caller would wait for ever: the request no longer waits in the queue."""
+    line = TimedLine()
+
+    def breaks(*_: object) -> bool:
+        raise ZeroDivisionError("on purpose")
+
+    monkeypatch.setattr(line.dispatcher.steps, "end_form", breaks)
+    line.end = math.inf
+    job = line.ask(Priority.OPERATOR_WRITE, word=word)
+    with pytest.raises(ZeroDivisionError):
+        await line.dispatcher.serve(line)  # type: ignore[arg-type]
+    error = job.answer.exception(0)
+    assert isinstance(error, LineFailed)
+    assert str(error).startswith("The reply could not be judged: ZeroDivisionError('on purpose').")
+    assert str(error).endswith(OUTCOME_UNKNOWN) is unknown

@@ -240,8 +240,15 @@ class Dispatcher:
             job.fail(LineFailed(with_fate(job, f"The request failed: {error!r}.")))
             raise
         self.in_flight = False
-        self._queue.count(job, begun, self._clock(), acknowledged=result.kind is ResultKind.REPLY)
-        self._conclude(job, result, begun)
+        acknowledged = result.kind is ResultKind.REPLY
+        try:
+            self._queue.count(job, begun, self._clock(), acknowledged=acknowledged)
+            self._conclude(job, result, begun)
+        except BaseException as error:
+            # its caller must not wait for ever; the line is opened again
+            if not job.answer.done() and job not in self._queue.waiting():
+                job.fail(LineFailed(with_fate(job, f"The reply could not be judged: {error!r}.")))
+            raise
 
     async def _resolve_echo(self, master: Master, job: Job, result: ExchangeResult) -> None:
         """Decide if a result is the adapter's echo or the reply, by the echo of a read.
