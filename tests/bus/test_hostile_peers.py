@@ -117,7 +117,9 @@ async def test_bytes_received_while_suspended_in_sending_are_not_a_reply() -> No
     result = await master.exchange(requested)
     assert result.kind is ResultKind.NOTHING
     await master.quiet()
-    assert [piece.whole for piece in strays] == [True]
+    # nor a copy of one, after which its drive would count as repeating itself
+    assert strays == []
+    assert around.tally.stale == 1
     # sent anyway, which a write must know
     assert len(transport.sent) == 1
     master.close()

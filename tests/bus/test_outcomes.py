@@ -123,14 +123,15 @@ def test_reply_has_its_words_and_the_time_of_its_end_or_of_the_first_try() -> No
 
 
 @pytest.mark.parametrize(
-    ("max_age", "programs", "kept"), [(0.0, 1, False), (1.0, 1, True), (0.0, 2, True)]
+    ("max_age", "programs", "mistakable", "kept"),
+    [(0.0, 1, False, False), (1.0, 1, False, True), (0.0, 2, False, True), (1.0, 2, True, False)],
 )
 def test_words_are_kept_while_another_reader_may_use_them(
-    max_age: float, programs: int, kept: bool
+    max_age: float, programs: int, mistakable: bool, kept: bool
 ) -> None:
     ends = Ends()
     ends.facts.programs = ("program",) * programs  # type: ignore[assignment]
-    ends.end(read(max_age=max_age), ResultKind.REPLY, pdu=VALUE)
+    ends.end(read(max_age=max_age, mistakable=mistakable), ResultKind.REPLY, pdu=VALUE)
     assert (ends.outcomes.values.find(Read(1, 100, 1), 9.75) is not None) == kept
 
 

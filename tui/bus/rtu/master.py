@@ -115,6 +115,8 @@ class RtuMaster:
         self._ends = 0.0
         """Timeout of that reply if no further byte comes."""
         self._idle = bytearray()
+        self._distrusts = False
+        """True while nothing is concluded from bytes: not even that a reply came twice."""
         self._early: deque[bool] = deque(maxlen=REMEMBERED)
         """Of the last replies, whether each began before its request was over."""
         self._port_errors = port_errors
@@ -271,10 +273,14 @@ class RtuMaster:
         The program was suspended while it sent: bytes since then may answer an earlier request.
         """
         clock = self._around.clock
-        self._exchange = None
+        self._exchange, self._distrusts = None, True
         self._sent = self._last = clock() + (len(sending.pdu) + 3) * self._character
-        while self.failure is None and clock() < self._sent + sending.time_out:
-            await self._transport.rest(self._sent + sending.time_out)
+        try:
+            while self.failure is None and clock() < self._sent + sending.time_out:
+                await self._transport.rest(self._sent + sending.time_out)
+            self._sort_idle()
+        finally:
+            self._distrusts = False
         if self.failure is not None:
             raise self.failure
         return ExchangeResult(ResultKind.NOTHING)
@@ -327,7 +333,8 @@ class RtuMaster:
             self._around.trace.add(self._last, "in", piece.data, note)
             if piece.whole:
                 self._around.tally.stale += 1
-                self._around.stray(piece, self._last)
+                if not self._distrusts:
+                    self._around.stray(piece, self._last)
 
     def _count_port_errors(self) -> None:
         """Add the port's error counts since the last call; only called if a reply fails."""

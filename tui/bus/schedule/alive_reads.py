@@ -72,7 +72,7 @@ class AliveReads:
             return due
         # beyond its timeout it has acted: it need no longer go before the others
         priority = Priority.FEED if now - heard < alive.timeout else Priority.POLL
-        job = Job(alive.request, priority, self._devices[alive.device].limits)
+        job = Job(alive.request, priority, self._devices[alive.device].limits, keeps_alive=True)
         job.program, job.requested = program, now
         self._jobs[alive.device] = job
         self._submit(job)

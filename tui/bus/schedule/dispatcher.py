@@ -352,6 +352,11 @@ class Dispatcher:
             return Sending(request.device, job.pdu, None, 0.0, look=look)
         now = self._clock()
         sure, skip = self._devices.doubts(request.device, job.expectation, now, job.tries)
+        job.mistakable = job.keeps_alive and skip > 0
+        if job.mistakable:
+            # it goes out while replies are late: to wait for the second one, after a first that was
+            # its own, would take the line from all other drives
+            skip = 0
         return Sending(
             request.device,
             job.pdu,

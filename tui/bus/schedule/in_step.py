@@ -173,8 +173,9 @@ class InStep:
         """Note the end of an exchange, of a job or of a probe for it, maybe with a number."""
         device, now = job.request.device, self._clock()
         before = self._probes.sent(device)
-        certain = number or (bool(before) and expectation not in before)
-        proves = certain or (device in self._weak and expectation != before[-1])
+        certain = number or (bool(before) and expectation not in before and not job.mistakable)
+        weak = device in self._weak and not job.mistakable
+        proves = certain or (weak and expectation != before[-1])
         self._weak.discard(device)
         self._missed.clear() if self._gateway else self._missed.pop(device, None)
         if result.kind is ResultKind.NOTHING and expectation == job.expectation:

@@ -181,7 +181,7 @@ class Outcomes:
 
         That is another program, or another client of this one: a gateway uses earlier values.
         """
-        if len(self._facts.programs) > 1 or job.max_age:
+        if not job.mistakable and (len(self._facts.programs) > 1 or job.max_age):
             self.values.note(job.request, reply.words, reply.time)
 
     def _report_write(self, job: Job, time: float) -> None:

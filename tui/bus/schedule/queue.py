@@ -35,6 +35,10 @@ class Job:
     """The longer read that is sent for it."""
     probes: int = 0
     """Requests that were sent before it so that its drive proves its step."""
+    keeps_alive: bool = False
+    """True if nothing of its reply is used: it only keeps its drive from a timeout."""
+    mistakable: bool = False
+    """True if it was sent when a reply to an earlier request could be taken for its own."""
     begun: bool = False
     """True if it was taken from the queue once: then it can no longer be withdrawn."""
     expectation: Expectation | None = None
