@@ -38,7 +38,7 @@ from .fakes import OneDrive
 
 PROFILE = library.load("atv312")
 STATUS, COMMAND, HERTZ = (PROFILE[code].address for code in ("ETA", "CMD", "rFr"))
-RUNNING, SWITCHED_ON = 0x0627, 0x0223
+RUNNING, SWITCHED_ON, STOPPING = 0x0627, 0x0223, 0x0607
 LONG_RAMP = 3000
 
 
@@ -264,6 +264,8 @@ async def test_motor_runs_on_if_it_has_not_slowed_down_for_the_time_it_has_to_ob
         (RUNNING, 0.0, None, True),
         (RUNNING, 60.0, None, True),
         (RUNNING, 60.0, 90.0, True),
+        (STOPPING, 60.0, None, True),
+        (RUNNING, 60.0, 60.0, False),
         (RUNNING, 60.0, 30.0, False),  # it may have been changed at rest since
         (SWITCHED_ON, 60.0, None, False),
         (SWITCHED_ON, 0.0, None, True),
