@@ -11,17 +11,23 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer
 from tui.drive.channel import Channel
-from tui.drive.orders import choose
+from tui.drive.orders import choose, stop_in_any
+from tui.drive.profile import library
 from tui.session.command import last_known, motor_stop
 from tui.session.command.last_known import run_by_others
-from tui.session.command.motor_stop import FirstWave
-from tui.session.command.stop_report import Phase, not_stopped
+from tui.session.command.motor_stop import FirstWave, MotorStop
+from tui.session.command.stop_report import Phase, not_proved, not_stopped
+from tui.session.drive import DriveSession
 from tui.session.journal import Journal
+from tui.session.settings.write import Writer
 
 from .test_stop_followed import (
     COMMAND,
+    HERTZ,
     PROFILE,
     RUNNING,
+    STATUS,
+    SWITCHED_ON,
     OneStop,
     OwnTime,
     Ramp,
@@ -31,6 +37,7 @@ from .test_stop_followed import (
 
 __all__ = ["journal"]
 CHART = PROFILE.data.charts[0]
+ENABLED_STILL, TURNS = "it is at 0 Hz and still enabled", "a reference turns it at once."
 RAMP_STOP = choose(CHART, "stop", {})
 
 
@@ -171,4 +178,157 @@ async def test_word_keeps_option_bits_only_of_a_known_word(
     await here.stop._send(CHART, RAMP_STOP)
     await here.stop._send(CHART, RAMP_STOP)
     assert here.written == [5, 0x0800, 0x0800], "the word before the stop"
-    assert COMMAND == PROFILE["CMD"].address
+    assert PROFILE["CMD"].address == COMMAND
+
+
+# -- what follows the word -------------------------------------------------------------------------
+
+ATV71 = library.load("atv71")
+
+
+class Halting(Ramp):
+    """An Altivar 71 that ramps down at its halt, and stays enabled until its last word."""
+
+    def __init__(self, **held: int) -> None:
+        super().__init__(OwnTime(), 0.0)
+        self.registers.update({ATV71[code].address: raw for code, raw in held.items()})
+
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        if self.stopped_at is not None:
+            self.registers[HERTZ] = max(0, self.registers[HERTZ] - 1000)
+
+    async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
+        if list(values) == [7]:
+            assert self.registers[HERTZ] == 0, "a shutdown would let the motor coast"
+            self.registers[STATUS] = SWITCHED_ON
+        return await super().write(device, address, values, **how)
+
+
+def stop_of_71(journal: Journal, **held: int) -> OneStop:
+    here = OneStop(Halting(**held), journal)
+    here.session = DriveSession(here.drive, 1, ATV71, clock=here.drive.clock)
+    writer = Writer(here.session, journal, None)
+    here.stop = MotorStop(here.session, writer, "stop", 1000.0, here.stop.say)
+    return here
+
+
+@pytest.mark.parametrize(
+    ("chcf", "dotd", "words"), [(1, 0, [0x10F]), (1, 1, [7]), (3, 0, [0]), (9, 0, None)]
+)
+async def test_words_of_a_stop_are_selected_by_what_the_drive_holds(
+    chcf: int, dotd: int, words: list[int] | None, journal: Journal
+) -> None:
+    here = stop_of_71(journal, CHCF=chcf, DOTD=dotd)
+    _, order = await here.stop._chosen()
+    assert list(order.words) == (words or list(stop_in_any(ATV71, {})[1].words))
+
+
+async def test_motor_that_a_halt_has_stopped_gets_the_word_that_ends_operation(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checked: list[object] = []
+
+    async def check(reader: object, priority: Priority) -> None:
+        checked.append((reader, priority))
+
+    monkeypatch.setattr(motor_stop, "check_byte_order", check)
+    here = stop_of_71(journal, CHCF=1)
+    assert await here.stop.carry_out() is None
+    assert here.written == [0x10F, 7]
+    assert [text for *_, text, _ in here.reports] == [
+        "Halt", "Halt, 200 Hz", "Halt, 100 Hz", "Ramp stop", "stopped",
+    ]  # fmt: skip
+    assert checked == [(here.stop.reader, Priority.OPERATOR_READ)]
+    assert here.session.full_reads_requested > 0
+
+
+Moves = list[tuple[str, float | None]]
+
+
+async def follow(here: OneStop, moves: Moves, monkeypatch: pytest.MonkeyPatch) -> str | None:
+    """The result of a stop whose motor moves so; the last entry repeats."""
+    seen = iter(moves)
+
+    async def motion(_: object, chart: object) -> tuple[str, float | None]:
+        return next(seen, moves[-1])
+
+    monkeypatch.setattr(MotorStop, "_motion", motion)
+    monkeypatch.setattr(motor_stop, "STANDSTILL_POLL_INTERVAL", 0.25)
+    return await here.stop._follow(CHART, RAMP_STOP)
+
+
+async def test_motor_is_reported_as_run_by_others_only_while_it_runs(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    monkeypatch.setattr(motor_stop, "run_by_others", lambda _: "the keypad runs it.")
+    moves: Moves = [("running", 30.0), ("stopping", 20.0), ("unknown", None), ("stopped", None)]
+    before = here.session.full_reads_requested
+    assert await follow(here, moves, monkeypatch) is None
+    assert [report[:2] for report in here.reports] == [
+        (Phase.UNHEEDED, not_stopped("the keypad runs it.")), (Phase.STOPPING, "Ramp stop, 20 Hz"),
+        (Phase.STOPPING, "Ramp stop"), (Phase.STOPPED, "stopped"),
+    ]  # fmt: skip
+    assert here.drive.clock.now == 1000.75
+    assert here.session.full_reads_requested == before + 1
+    assert here.stop._unheeded is False
+
+
+@pytest.mark.parametrize(
+    ("constant", "seconds", "moves", "ends"),
+    [
+        ("STOP_FOLLOWED_FOR", 1.0, [("stopping", 1.0)], 1001.0),
+        ("TAKES_EFFECT", 0.5, [("running", 30.0)], 1000.75),
+        ("TAKES_EFFECT", 0.5, [("running", None)], 1000.75),
+        ("TAKES_EFFECT", 0.5, [("running", 0.0)], 1000.75),
+    ],
+)
+async def test_motor_is_followed_for_its_time_and_no_longer(
+    constant: str, seconds: float, moves: Moves, ends: float, journal: Journal,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    monkeypatch.setattr(motor_stop, constant, seconds)
+    assert await follow(here, moves, monkeypatch)
+    assert here.drive.clock.now == ends
+
+
+@pytest.mark.parametrize(
+    ("hertz", "local", "channel", "others", "text"),
+    [
+        (30.0, False, "", "the keypad runs it.", "the keypad runs it."),
+        (0.0, False, "", "the keypad runs it.", f"{ENABLED_STILL} by another source: {TURNS}"),
+        (0.0, True, "x", "", f"{ENABLED_STILL} from its terminals or keypad: {TURNS}"),
+        (0.0, False, "by CANopen", "", f"{ENABLED_STILL} by CANopen: {TURNS}"),
+        (30.0, True, "x", "", "it answers and runs on; it is commanded from its terminals or"
+         " keypad."),
+        (None, False, "by CANopen", "", "it answers and runs on; it is commanded by CANopen."),
+        (30.0, False, "", "", "it answers and runs on; it is commanded by another source."),
+    ],
+)  # fmt: skip
+def test_reason_of_a_motor_that_does_not_stop_names_the_source_of_its_commands(
+    hertz: float | None, local: bool, channel: str, others: str, text: str, journal: Journal,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    monkeypatch.setattr(motor_stop, "run_by_others", lambda _: others)
+    monkeypatch.setattr(
+        DriveSession, "state", lambda *_: SimpleNamespace(local=local, channel=channel)
+    )
+    assert here.stop._why_not(hertz) == text
+
+
+@pytest.mark.parametrize(
+    ("guessed", "phase", "text"),
+    [
+        (False, Phase.STOPPED, "stopped (it has no quick stop: ramp stop)"),
+        (True, Phase.FAILED, not_proved(PROFILE.name)),
+    ],
+)
+def test_standstill_by_a_guessed_profile_proves_nothing(
+    guessed: bool, phase: Phase, text: str, journal: Journal
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    here.session.guessed, here.stop.wanted = guessed, "quick-stop"
+    here.stop._tell_standing()
+    assert here.reports == [(phase, text, 1000.0)]
