@@ -144,6 +144,20 @@ def test_job_that_ends_unsent_does_not_wait(refused: bool) -> None:
     assert rig.it._wake.is_set()
 
 
+def test_read_is_answered_by_words_that_are_recent_enough() -> None:
+    rig, job = Rig(), job_of(max_age=1.5)
+    rig.outcomes.values.find.return_value = reply = Reply((100,), NOW)
+    rig.it.submit(job)
+    rig.outcomes.values.find.assert_called_once_with(READ, NOW - 1.5)
+    assert job.answer.result(0) is reply
+
+
+def test_refusal_is_that_of_the_state_that_the_programs_share() -> None:
+    rig = Rig()
+    rig.it.facts = Mock(paused={1: ("another", "polling is paused")})
+    assert rig.it.refusal(job_of(program="this")) == "polling is paused"
+
+
 async def test_all_that_waits_is_taken_out_once_something_does() -> None:
     rig, job = Rig(), job_of()
     rig.it.wake()
@@ -292,9 +306,12 @@ async def test_sleep_ends_with_its_pause_or_with_a_wake() -> None:
     async with asyncio.timeout(5.0):
         await rig.it._sleep(0.001)
     for pause in (math.inf, 60.0):
-        asyncio.get_running_loop().call_soon(rig.it.wake)
-        async with asyncio.timeout(5.0):
-            await rig.it._sleep(pause)
+        sleep = asyncio.create_task(rig.it._sleep(pause))
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert not sleep.done()
+        rig.it.wake()
+        await asyncio.wait_for(sleep, 5.0)
         rig.it._wake.clear()
 
 
@@ -302,15 +319,17 @@ def test_request_waits_for_the_last_of_what_holds_it_back() -> None:
     rig, job = Rig(), job_of(within=0.1)
     assert rig.it._not_before(job) == 0.0
     rig.devices.not_before.return_value = NOW + 4
+    for part in (rig.back_to_back, rig.proof):
+        part.not_before.return_value = NOW  # no longer than now
     assert rig.it._not_before(job) == NOW + 4
+    rig.steps.not_before.assert_called_with(job, NOW)
+    rig.proof.not_before.assert_called_with(job, NOW)
+    rig.back_to_back.not_before.assert_called_with(job)
     rig.devices.not_before.assert_called_with(1, job.expectation, job.priority, NOW, job.tries)
     rig.devices.backed_off.return_value = 2.0
     assert rig.it._not_before(job) == 0.0
     rig.devices.backed_off.assert_called_with(1, job.priority, NOW, 0.1)
     for part, later in ((rig.back_to_back, 3), (rig.proof, 2), (rig.steps, 1)):
-        part.not_before.return_value = NOW  # no longer than now
-        expected = NOW if part is rig.steps else rig.it._not_before(job)
-        assert rig.it._not_before(job) == expected
         part.not_before.return_value = NOW + later
         assert rig.it._not_before(job) == NOW + later
     rig.it.held_back = lambda: True

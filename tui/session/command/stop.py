@@ -269,7 +269,7 @@ class Stopper:
             stop.over = True
 
     async def _carry_out(self, stop: MotorStop) -> None:
-        error = "it did not answer"
+        error = ""
         for _ in range(STOP_TRIES):
             try:
                 text = await stop.carry_out()
