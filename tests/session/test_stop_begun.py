@@ -66,8 +66,11 @@ def test_stop_ends_the_work_on_its_drive_and_is_watched(
     here = Begun(journal, monkeypatch)
     session = here.session()
     session.arming.arm()
+    heard: list[object] = []
+    monkeypatch.setattr(here.drive.facts, "give_stop", lambda *of: heard.append(of))
     before = session.work.stops
-    here.stopper.stop([session], by="a test")
+    here.stopper.stop([session])
+    assert heard == [([1], "the stop key")]
     assert session.work.stops == before + 1
     assert not session.arming.armed
     found = here.begun()
