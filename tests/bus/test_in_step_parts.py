@@ -10,7 +10,7 @@ from unittest.mock import AsyncMock, MagicMock, Mock
 import pytest
 
 from tui.bus.api import Priority
-from tui.bus.errors import LineLost
+from tui.bus.errors import LineBehind, LineLost
 from tui.bus.line import Timing
 from tui.bus.master import ExchangeResult, Piece, ResultKind
 from tui.bus.requests import BROADCAST, Diagnose, Identify, Read, ReportId, Request, WriteOne
@@ -524,3 +524,23 @@ async def test_line_without_a_free_probe_waits_for_one(
     assert here.it._waited == waited + seconds
     assert here.it._tries == (0 if seconds else PROBES)
     here.master.quiet.assert_not_awaited()
+
+
+@pytest.mark.parametrize(
+    ("behind", "job", "refused"),
+    [
+        ("", job_of(), False), (BEHIND, job_of(), True),
+        (BEHIND, job_of(WRITE, Priority.STOP), False),
+        (BEHIND, job_of(WRITE, Priority.OPERATOR_WRITE), True),
+    ],
+)  # fmt: skip
+def test_line_that_is_behind_refuses_all_but_stop_words(
+    behind: str, job: Job, refused: bool
+) -> None:
+    rig = Rig()
+    rig.it.behind = behind
+    assert rig.it.refuses(job) is refused
+    assert job.answer.done() == refused
+    if refused:
+        error = job.answer.exception(0)
+        assert (type(error), str(error)) == (LineBehind, BEHIND)

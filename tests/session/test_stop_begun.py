@@ -22,7 +22,7 @@ __all__ = ["journal"]
 
 
 class Worker:
-    """Work that does not begin by itself."""
+    """Work that never begins."""
 
     def __init__(self) -> None:
         self.is_done = self.canceled = False

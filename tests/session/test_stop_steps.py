@@ -68,7 +68,7 @@ async def test_word_of_a_stop_has_the_priority_of_stops_and_is_in_the_journal(
     assert [entry.why for entry in journal.recent] == ["stopped: Ramp stop"]
 
 
-async def test_what_selects_a_stop_is_read_with_the_priority_of_stops(journal: Journal) -> None:
+async def test_conditions_of_a_stop_are_read_with_the_priority_of_stops(journal: Journal) -> None:
     drive = Watched()
     here = OneStop(drive, journal)
     await here.stop._read_anew(["CHCF", "ETA", "CHCF"])
@@ -85,7 +85,7 @@ async def test_stop_of_a_drive_that_cannot_be_read_is_by_what_is_certain(
     here = OneStop(Ramp(OwnTime(), 0.0), journal)
     any_chart = object()
 
-    async def read_anew(*_: object) -> None:
+    async def silent(*_: object) -> None:
         raise NoAnswer(1, 3, 3201)
 
     def in_force(profile: object, raws: object) -> Any:
@@ -93,7 +93,7 @@ async def test_stop_of_a_drive_that_cannot_be_read_is_by_what_is_certain(
         return CHART if known else None
 
     monkeypatch.setattr(motor_stop, "chart_in_force", in_force)
-    monkeypatch.setattr(motor_stop.MotorStop, "_read_anew", read_anew)
+    monkeypatch.setattr(motor_stop.MotorStop, "_read_anew", silent)
     monkeypatch.setattr(motor_stop, "stop_in_any", lambda *of: (any_chart, *of))
     found = cast(Any, await here.stop._chosen())
     if known:
