@@ -63,6 +63,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
     "a write that is refused": (5, ("write", *DRIVE, "BIR=1", "--arm"), {"WriteDocument"}),
     "a backup": (0, ("backup", *DRIVE, "FOLDER/new.toml"), {"BackupDocument"}),
     "a report": (0, ("report", *DRIVE, "FOLDER/new.md"), {"ReportDocument"}),
+    "a page": (0, ("report", *DRIVE, "FOLDER/new.html"), {"ReportDocument"}),
     "a bundle": (0, ("bundle", DRIVE[0], "--output", "FOLDER/new.zip"), {"BundleDocument"}),
     "a plan": (0, ("restore", DRIVE[0], "FOLDER/other.toml", "--dry-run", *DRIVE[1:]),
                {"RestoreDocument"}),

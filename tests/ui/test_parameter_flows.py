@@ -360,6 +360,9 @@ async def test_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         await message(made, "parameters", "pump.md")
         assert "Altivar 312" in read(Path("pump.md"))
         assert "Last run" not in read(Path("pump.md"))
+        await answer(made, "ctrl+r", "pump.html")
+        await message(made, "parameters", "pump.html")
+        assert read(Path("pump.html")).count("<article>") == 1
 
 
 async def test_report_has_the_trend_of_the_last_run_beside_it(

@@ -34,10 +34,7 @@ def report_text(
 
     `trends` are lines about its last trip and run.
     """
-    written = [entry for entry in entries if entry.kind == "write"]
-    trips = [entry for entry in entries if entry.kind == "fault"]
-    proofs = [entry for entry in entries if entry.kind == "proof"]
-    maker = _Report(profile, values, written, trips, proofs)
+    maker = ReportParts.from_entries(profile, values, entries)
     parts = (
         maker.head(),
         maker.line(),
@@ -58,19 +55,33 @@ PARAMETERS_READ = "- Parameters: {read} read", "- Parameters: {read} read, {abse
 
 
 @dataclass(frozen=True, slots=True)
-class _Report:
+class ReportParts:
+    """The parts of a report on one drive, each as lines of Markdown."""
+
     profile: Profile
     values: ParameterSet
     entries: Sequence[Entry]
     trips: Sequence[Entry]
     proofs: Sequence[Entry] = ()
 
+    @classmethod
+    def from_entries(
+        cls, profile: Profile, values: ParameterSet, entries: Sequence[Entry]
+    ) -> ReportParts:
+        """Return the parts; `entries` are the drive's journal entries, oldest first."""
+        written, trips, proofs = (
+            [entry for entry in entries if entry.kind == kind]
+            for kind in ("write", "fault", "proof")
+        )
+        return cls(profile, values, written, trips, proofs)
+
     @property
     def zone(self) -> tzinfo:
         """Time zone of all times in the report: that of the computer that read the drive."""
         return _zone_of(self.values.head.time)
 
-    def _zone_text(self) -> str:
+    def zone_text(self) -> str:
+        """Return the zone as its difference from UTC."""
         offset = datetime.now(self.zone).strftime("%z")
         return f"UTC{offset[:3]}:{offset[3:5]}"
 
@@ -84,7 +95,7 @@ class _Report:
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
             "",
-            f"- Read: {_when(head.time, self.zone)}; times here are {self._zone_text()}",
+            f"- Read: {zoned_time(head.time, self.zone)}; times here are {self.zone_text()}",
             f"- Profile: {self.profile.id}, version {head.profile_version}; panel {head.panel}",
             *(known or ["- The drive does not identify itself."]),
             PARAMETERS_READ[bool(absent)].format(read=len(self.values.raws), absent=absent),
@@ -96,7 +107,8 @@ class _Report:
             (s.parameter, self.profile[s.parameter].name, self.text(s.parameter))
             for s in self.profile.data.link.settings
         ]
-        return ["## Line settings of the drive", "", *_table(("code", "name", "value"), rows)]
+        table = table_markdown(("code", "name", "value"), rows)
+        return ["## Line settings of the drive", "", *table]
 
     def changed(self) -> list[str]:
         """Return the settings that differ from the factory's, with the first old value written."""
@@ -115,7 +127,7 @@ class _Report:
             f"The factory settings of {known} parameters are known; ? marks those that no document"
             " of this family states. Before: the first old value in the journal.",
             "",
-            *_table(("code", "name", "factory", "now", "before"), rows),
+            *table_markdown(("code", "name", "factory", "now", "before"), rows),
         ]
 
     def control(self) -> list[str]:
@@ -146,7 +158,7 @@ class _Report:
             return [*lines, "This family has none."]
         for block in self.profile.data.blocks:
             rows = [(slot, self._target(block, slot)) for slot in block.slots]
-            lines += [f"{block.name}:", "", *_table(("place", "mapped to"), rows), ""]
+            lines += [f"{block.name}:", "", *table_markdown(("place", "mapped to"), rows), ""]
         return lines[:-1]
 
     def _target(self, block: Block, slot: str) -> str:
@@ -185,14 +197,14 @@ class _Report:
         """Return the present or last fault, and the drive's fault history."""
         data = self.profile.data.faults
         codes = list(dict.fromkeys(code for code in (data.parameter, *data.history) if code))
-        rows = [(code, self.profile[code].name, self._fault(code)) for code in codes]
-        lines = ["## Faults", "", *_table(("code", "name", "fault"), rows)]
+        rows = [(code, self.profile[code].name, self.fault_text(code)) for code in codes]
+        lines = ["## Faults", "", *table_markdown(("code", "name", "fault"), rows)]
         for code, stored in zip(data.history, data.stored, strict=False):
             if self.values.raws.get(code) in (None, data.none):
                 continue
             kept = [(text, self.profile[text].name, self.text(text)) for text in stored]
-            head = f"What the drive stored with {code}, {self._fault(code)}:"
-            lines += ["", head, "", *_table(("code", "name", "value"), kept)]
+            head = f"What the drive stored with {code}, {self.fault_text(code)}:"
+            lines += ["", head, "", *table_markdown(("code", "name", "value"), kept)]
         return [*lines, *self._pointed_at(codes)]
 
     def _pointed_at(self, codes: Sequence[str]) -> list[str]:
@@ -211,7 +223,8 @@ class _Report:
             lines += ["", f"What {fault.code} {fault.name} points at:", "", *reported]
         return lines
 
-    def _fault(self, code: str) -> str:
+    def fault_text(self, code: str) -> str:
+        """Return the fault in a word of the drive, with its code and name."""
         raw = self.values.raws.get(code)
         if raw is None:
             return NOT_AVAILABLE
@@ -224,25 +237,27 @@ class _Report:
         """Return the trips of this drive that Drive Panel observed on this computer."""
         rows = [
             (
-                _when(trip.tripped, self.zone) if trip.tripped else "not seen",
-                _when(trip.seen, self.zone),
+                zoned_time(trip.tripped, self.zone) if trip.tripped else "not seen",
+                zoned_time(trip.seen, self.zone),
                 trip.code,
                 trip.name,
-                _when(trip.reset, self.zone) if trip.reset else "",
+                zoned_time(trip.reset, self.zone) if trip.reset else "",
             )
             for trip in trips_of(self.trips)[-ENTRIES_SHOWN:]
         ]
         head = ("tripped at", "seen since", "fault", "name", "reset seen at")
-        return ["## Trips seen by Drive Panel", "", *_table(head, rows)] if rows else []
+        return ["## Trips seen by Drive Panel", "", *table_markdown(head, rows)] if rows else []
 
     def journal(self) -> list[str]:
         """Return the writes to this drive from this computer."""
         last = self.entries[-ENTRIES_SHOWN:]
         left = len(self.entries) - len(last)
-        rows = [(_when(e.time, self.zone), e.code, e.old, e.new, e.answer, e.why) for e in last]
+        rows = [
+            (zoned_time(e.time, self.zone), e.code, e.old, e.new, e.answer, e.why) for e in last
+        ]
         head = ("time", "code", "old", "new", "answer", "why")
         earlier = [f"{left} earlier ones are in the journal.", ""] if left else []
-        return ["## Writes by Drive Panel", "", *earlier, *_table(head, rows)]
+        return ["## Writes by Drive Panel", "", *earlier, *table_markdown(head, rows)]
 
     def text(self, code: str) -> str:
         """Return a parameter's value with its unit, or dashes."""
@@ -254,7 +269,7 @@ class _Report:
         return shown(self.profile, parameter, raw, raws, lacking(self.profile, raws)).display
 
 
-def _when(text: str, zone: tzinfo | None) -> str:
+def zoned_time(text: str, zone: tzinfo | None) -> str:
     """Format an ISO time in a zone, to the second; return an invalid time unchanged."""
     try:
         return f"{datetime.fromisoformat(text).astimezone(zone):%Y-%m-%d %H:%M:%S}"
@@ -270,7 +285,8 @@ def _zone_of(text: str) -> tzinfo:
         return UTC
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+def table_markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return rows as a Markdown table; "None." without a row."""
     lines = ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows]
     if not lines:
         return ["None."]

@@ -6,8 +6,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..shared.errors import INTERRUPTED, Failure
-from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
+import click
+
+from ..shared.drives import USUAL_SEARCH
+from ..shared.errors import INTERRUPTED, Failure, end_with
+from ..shared.options import Target, json_option, line_argument, never_forced, several_settings
 from ..shared.registration import ON_LINE, command
 from ..shared.say import Messages
 from ..shared.sets import (
@@ -27,15 +30,41 @@ if TYPE_CHECKING:
 @line_argument
 @file_argument
 @force_option
+@click.option("--page", is_flag=True, help="Write one page for the customer (.md, .html, .txt).")
+@click.option(
+    "--tests",
+    type=click.Path(path_type=Path, exists=True, file_okay=False),
+    metavar="FOLDER",
+    help="Search FOLDER for results of accept (default: FILE's).",
+)
+@click.option("--all", "every", is_flag=True, help="Write a page about every drive that answers.")
+@click.option(
+    "--addresses",
+    metavar="LIST",
+    help=f"Scan these addresses with --all (default: {USUAL_SEARCH}).",
+)
 @json_option
-@settings_options
+@several_settings
 @never_forced
-def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
+def report(
+    target: Target,
+    file: Path,
+    force: bool,
+    page: bool,
+    tests: Path | None,
+    every: bool,
+    addresses: str | None,
+    as_json: bool,
+) -> None:
     """Write a report on a drive to FILE, as Markdown; `-` is standard output.
 
     It has identification, line settings, settings changed from the factory, control source,
     scanner, reaction to a communication loss, faults, and writes by Drive Panel. The trends of the
     last trip and the last run are SVG files next to FILE; on standard output they are text.
+
+    With --page it is one page for the customer instead, with the tests that `accept` has passed and
+    lines for signatures. The suffix of FILE selects its form, and .html needs no --page. Several -d
+    or --all write a page for each drive.
     """
     import time
 
@@ -49,6 +78,16 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     from ..shared.output import drive_fields, print_json
 
     refuse_output(file, force=force, as_json=as_json)
+    if addresses and not every:
+        raise click.UsageError("--addresses requires --all.")
+    if page or file.suffix.casefold() in (".html", ".htm"):
+        from ..running.customer_page import PageWriter
+
+        wanted = PageWriter(target, file, tests, every, addresses, force, as_json)
+        end_with(wanted.write())
+        return
+    if every or tests or target.others:
+        raise click.UsageError("--all, --tests and several -d require --page.")
     if file != STANDARD:
         for kind in TREND_KINDS:
             drawing = file.with_name(trend_file(file.stem, kind))

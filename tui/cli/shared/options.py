@@ -197,6 +197,8 @@ drives_options = _target_of(several_devices_option, profile_option, rated_curren
 """The same for commands that take several drives."""
 settings_options = _target_of(profile_option, device_option)
 """The same for commands about settings, where a current is a word like any other."""
+several_settings = _target_of(profile_option, several_devices_option)
+"""The same for commands about the settings of several drives."""
 
 
 def on_line(

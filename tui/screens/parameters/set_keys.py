@@ -160,6 +160,7 @@ class SetKeys(ParameterKeys):
         """Ask for a file, read everything, and write a report for a customer."""
         from tui.drive.settings.set_file import write_file
         from tui.session.journal_reading import entries_of
+        from tui.session.page_forms import PAGE_SUFFIXES, page_text
         from tui.session.report import report_text
         from tui.session.report_trends import linked, report_trend_lines, report_trends, trend_files
 
@@ -169,6 +170,8 @@ class SetKeys(ParameterKeys):
 
         def text(values: ParameterSet, path: Path) -> str:
             entries = entries_of(self.editor.journal, self.session.line_text, device)
+            if path.suffix.casefold() in PAGE_SUFFIXES:
+                return page_text(profile, values, entries, path)
             files = recorder.files() if recorder is not None else []
             trends = report_trends(files, device, profile, entries, now)
             drawn = trend_files(trends, path.stem)
@@ -178,7 +181,8 @@ class SetKeys(ParameterKeys):
 
         about = (
             "Identity, line, changed settings, control source, communication loss reaction, faults,"
-            " last trip and run (as SVG files), writes by Drive Panel (Markdown)."
+            " last trip and run (as SVG files), writes by Drive Panel (Markdown). A name ending in"
+            " .html or .txt: one page for the customer."
         )
         self._ask_for_file("Report to", "md", about, text, [])
 

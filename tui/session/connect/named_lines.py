@@ -33,6 +33,9 @@ LONGEST_SETTINGS = 200_000
 """Bytes of a file that may be the settings."""
 LINES_TABLE = "lines"
 RECORD_TABLE, RECORD_KEY = "record", "on"
+REPORT_TABLE = "report"
+SETTINGS_TABLES = LINES_TABLE, RECORD_TABLE, REPORT_TABLE
+LONGEST_NAME = 60
 MOST_NAMED = 200
 _NAME = re.compile(r"(?!COM\d+$)[A-Za-z][A-Za-z0-9_-]{0,31}", re.IGNORECASE)
 _TAKEN = frozenset({"factory"})
@@ -56,6 +59,15 @@ class NamedLine(NamedTuple):
     profile: str | None = None
 
 
+class ReportNames(NamedTuple):
+    """Names on the page of a report for the customer; empty if the settings do not have them."""
+
+    company: str = ""
+    name: str = ""
+    customer: str = ""
+    customer_name: str = ""
+
+
 class LineSettings(NamedTuple):
     """Lines in the settings file, and its errors."""
 
@@ -70,6 +82,8 @@ class LineSettings(NamedTuple):
     """File, line and key by name."""
     record: bool = True
     """False if `on = false` in the table of the record."""
+    names: ReportNames = ReportNames()
+    """Table of the report."""
 
 
 def settings_file() -> Path:
@@ -169,13 +183,21 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
     found: dict[str, NamedLine] = {}
     at: dict[str, str] = {}
     faults: list[tuple[TomlPath, str]] = []
+    names = ReportNames()
     for key, value in tables.items():
         if key == RECORD_TABLE:
             faults += _record_faults(value)
             continue
+        if key == REPORT_TABLE:
+            names, wrong = _report_names(value)
+            faults += wrong
+            continue
         if key != LINES_TABLE or not isinstance(value, dict):
             faults.append(
-                ((key,), f"only a table [{LINES_TABLE}] or [{RECORD_TABLE}] is known here")
+                (
+                    (key,),
+                    f"only a table {', '.join(f'[{t}]' for t in SETTINGS_TABLES)} is known here",
+                )
             )
             continue
         for name, reported in list(value.items())[:MOST_NAMED]:
@@ -187,7 +209,7 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
     fault_texts = (
         f"{path}:{places.get(key, 1)}: {'.'.join(map(str, key))}: {fault}." for key, fault in faults
     )
-    return LineSettings(path, found, tuple(fault_texts), text, at, _is_recorded(tables))
+    return LineSettings(path, found, tuple(fault_texts), text, at, _is_recorded(tables), names)
 
 
 def _is_recorded(tables: Mapping[str, Any]) -> bool:
@@ -205,6 +227,24 @@ def _record_faults(table: object) -> Iterator[tuple[TomlPath, str]]:
             yield (RECORD_TABLE, key), f"only {RECORD_KEY} is known here"
         elif not isinstance(value, bool):
             yield (RECORD_TABLE, key), "true or false is wanted"
+
+
+def _report_names(table: object) -> tuple[ReportNames, list[tuple[TomlPath, str]]]:
+    """Return the names in the table of the report that are valid, and the errors of the others."""
+    keys = ReportNames._fields
+    if not isinstance(table, dict):
+        return ReportNames(), [((REPORT_TABLE,), f"expected a table with {', '.join(keys)}")]
+    found: dict[str, str] = {}
+    faults: list[tuple[TomlPath, str]] = []
+    for key, value in table.items():
+        if key not in keys:
+            faults.append(((REPORT_TABLE, key), f"only {', '.join(keys)} are known here"))
+        elif not isinstance(value, str) or len(value) > LONGEST_NAME:
+            text = f"expected a text of {LONGEST_NAME} characters at most"
+            faults.append(((REPORT_TABLE, key), text))
+        else:
+            found[key] = value
+    return ReportNames(**found), faults
 
 
 def _faults(
