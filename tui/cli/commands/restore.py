@@ -65,11 +65,16 @@ class _Restored(TypedDict):
     same_rating: bool | None
     needs_stop: bool
     across: bool
+    mapped_by: str | None
     results: list[EditField]
     saved: bool
     left: list[str]
 
 
+ACROSS_QUANTITIES = (
+    "The set is of another family: common quantities are carried over in their units."
+)
+ACROSS_TABLE = "The set is of a predecessor: settings that mean the same are carried over."
 ALIKE = 3
 """If more settings than this are omitted for one reason, they are reported without their values."""
 CODES_NAMED = 12
@@ -197,6 +202,7 @@ def _restored(
         "same_rating": plan.same_rating,
         "needs_stop": plan.needs_stop,
         "across": plan.across,
+        "mapped_by": plan.mapped_by or None,
         "results": result_fields(results),
         "saved": saved,
         "left": [edit.code for edit in left],
@@ -226,9 +232,9 @@ def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> No
     if plan.same_rating is False and not plan.across:
         messages.tell("The set is of another model or rating than this drive.")
     if plan.across:
-        messages.tell(
-            "The set is of another family: common quantities are carried over in their units."
-        )
+        messages.tell(ACROSS_TABLE if plan.mapped_by else ACROSS_QUANTITIES)
+    if plan.mapped_by:
+        messages.tell(f"Source of the table: {sentence(plan.mapped_by)}")
     counts = (
         f"{plan.count('write')} to write, {plan.count('equal')} equal already,"
         f" {plan.count('skip')} left out."

@@ -31,6 +31,8 @@ class RestoreDocument(DriveDocument, kw_only=True):
     same_rating: bool | None
     needs_stop: bool
     across: bool
+    mapped_by: str | None
+    """Source of the table between the two families; null if there is none."""
     results: list[EditField]
     saved: bool
     left: list[str]

@@ -289,6 +289,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "communication_fault": "The drive's communication monitoring.",
         "memory": "Words that save settings or restore factory settings.",
         "start_up": "First commissioning in order, one table per step.",
+        "predecessors": "Families that this one replaces, and settings that mean the same.",
         "connectors": "Connectors and their pins.",
         "line_rules": "Rules for the wiring.",
         "wiring": "Facts to know before touching the line or the drive.",

@@ -35,6 +35,7 @@ ROW_KEYS: Mapping[TomlPath, str] = {
     ("control_sources",): "id",
     ("signal_paths",): "id",
     ("start_up",): "step",
+    ("predecessors",): "profile",
     ("connectors",): "name",
     ("schematics",): "id",
     ("parts",): "number",

@@ -78,7 +78,9 @@ class RestorePlan:
     needs_stop: bool
     """True if at least one write requires the motor stopped."""
     across: bool
-    """True if the set is of another family: only common quantities are carried over."""
+    """True if the set is of another family: only what certainly means the same is carried over."""
+    mapped_by: str = ""
+    """Source of the table between the two families; empty if none is known."""
 
     def items_of_kind(self, kind: ItemKind) -> list[RestoreItem]:
         return [item for item in self.items if item.kind == kind]

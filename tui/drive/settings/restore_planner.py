@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from ..errors import ValueRefused
 from ..profile.profile import Profile, is_verified
-from ..profile.schema import Parameter, Quantity
+from ..profile.schema import Parameter, Predecessor, Quantity
 from ..shown import number_of, scale_sources, shown
 from .edits import Edit, Edits
 from .limits import edit_problems
@@ -59,11 +59,15 @@ def plan_restore(
     """Plan the writes that restore a parameter set to a drive.
 
     `profile` and `held` are the drive's, `source_profile` is the set's. Values of another family
-    are carried over by quantity, in engineering values.
+    are carried over in engineering values: by the table of a predecessor in the profile, or else by
+    quantity.
     """
     across = profile.id != source_profile.id
     planner = _Planner(profile, held, source, source_profile, options, across)
-    if across:
+    table = next((p for p in profile.data.predecessors if p.profile == source_profile.id), None)
+    if table is not None:
+        planner.add_table(table)
+    elif across:
         planner.add_quantities()
     else:
         planner.add_codes()
@@ -74,6 +78,7 @@ def plan_restore(
         same_rating=planner.same_rating,
         needs_stop=any(needs_standstill(profile, profile[e.code]) for e in planner.edits),
         across=across,
+        mapped_by=table.source if table is not None else "",
     )
 
 
@@ -138,13 +143,41 @@ class _Planner:
             if code in self.source.raws and code not in taken:
                 self._skip_theirs(parameter)
 
-    def _skip_theirs(self, parameter: Parameter) -> None:
+    def add_table(self, table: Predecessor) -> None:
+        """Add the settings of a predecessor that its table maps, and those that it does not map."""
+        pairs: list[tuple[Parameter, Parameter]] = []
+        for theirs in self.source_profile.parameters:
+            if theirs.code not in self.source.raws or not is_setting(self.source_profile, theirs):
+                continue
+            ours = self.profile.get(table.counterpart(theirs.code))
+            if ours is None or ours.unit != theirs.unit:
+                self._skip_theirs(theirs, table.unlike.get(theirs.code, ""))
+            else:
+                pairs.append((theirs, ours))
+        sources = scale_sources(self.profile)
+        for theirs, ours in sorted(pairs, key=lambda pair: pair[1].code not in sources):
+            raw = self.source.raws[theirs.code]
+            if theirs.code in self.source.lossy and not self.options.rounded:
+                self._skip(ours.code, "rounding", self.source.notes[theirs.code])
+            else:
+                self._consider(ours, self._typed(self.source_profile, theirs, raw), raw)
+        for code, text in self.source.unknown.items():
+            reason = f"the profile {self.source_profile.id} does not have it"
+            self._skip(f"{self.source_profile.id} {code}", "unknown", reason, text)
+        for code, why in self.source.absent.items():
+            absent = self.source_profile.get(code)
+            if absent is not None and is_setting(self.source_profile, absent):
+                key = f"{self.source_profile.id} {code}"
+                self._skip(key, "absent", f"it is not in the set: {why}")
+
+    def _skip_theirs(self, parameter: Parameter, reason: str = "") -> None:
         raw = self.source.raws[parameter.code]
         raws = self.source.raws
         value = shown(self.source_profile, parameter, raw, raws, lacking(self.source_profile, raws))
         key = f"{self.source_profile.id} {parameter.code}"
         if is_setting(self.source_profile, parameter):
             text = f"{self.profile.name} has no parameter that certainly means the same"
+            text = reason or text
             self._skip(key, "no counterpart", text, value.display)
 
     def _typed(self, profile: Profile, parameter: Parameter, raw: int) -> str:

@@ -145,6 +145,12 @@ def _port_counter_names(data: ProfileData) -> Iterator[NamedPlace]:
         yield ("port_counters", index, "checksum_errors"), port.checksum_errors
 
 
+def _predecessor_names(data: ProfileData) -> Iterator[NamedPlace]:
+    for index, predecessor in enumerate(data.predecessors):
+        for old, code in predecessor.codes.items():
+            yield ("predecessors", index, "codes", old), code
+
+
 def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
     for place, setting in enumerate(data.link.settings):
         yield ("link", "settings", place, "parameter"), setting.parameter
@@ -157,6 +163,7 @@ def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
     for index, step in enumerate(data.start_up):
         for place, code in enumerate(step.parameters):
             yield ("start_up", index, "parameters", place), code
+    yield from _predecessor_names(data)
     for index, source in enumerate(data.control_sources):
         for place, item in enumerate(source.settings):
             yield ("control_sources", index, "settings", place), item.parameter

@@ -47,6 +47,31 @@ class StartUpStep(Table, frozen=True, kw_only=True):
     """Certainty that the step belongs here; `practice` is general practice, from no document."""
 
 
+class Predecessor(Table, frozen=True, kw_only=True):
+    """A family that this one replaces, with the table of settings that mean the same in both.
+
+    Values are carried over in engineering units and by name. Settings that it does not map are
+    reported, and never written.
+    """
+
+    profile: Identifier
+    same_codes: bool = False
+    """True if settings with the same code mean the same."""
+    codes: dict[str, str] = {}
+    """Codes of this family by code of the predecessor."""
+    unlike: dict[str, str] = {}
+    """Reason by code of the predecessor, for settings that are not carried over."""
+    note: str = ""
+    source: str
+    confidence: Confidence
+
+    def counterpart(self, code: str) -> str:
+        """Return this family's code for a setting of the predecessor; empty without one."""
+        if code in self.unlike:
+            return ""
+        return self.codes.get(code, code if self.same_codes else "")
+
+
 class MemoryOrder(Table, frozen=True, kw_only=True):
     """A word that saves settings or restores factory settings."""
 
@@ -173,6 +198,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     communication_fault: CommunicationFault | None = None
     memory: MemoryOrders = MemoryOrders()
     start_up: list[StartUpStep] = []
+    predecessors: list[Predecessor] = []
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
     wiring: Wiring = Wiring()
