@@ -7,13 +7,14 @@ from pathlib import Path
 import click
 
 from ..shared.errors import USAGE, Failure
+from ..shared.line_argument import LineArgument
 from ..shared.options import SLAVE_ADDRESS, one_device
 from ..shared.registration import command
 from .panel import ascii_option, bell_option, low_bandwidth_option, mouse_option, run_panel
 
 
 @command("Show a record on the screens of the panel.", group="Watch")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("source", metavar="FILE|FOLDER|LINE", cls=LineArgument)
 @click.option("--at", "at", metavar="TIME", help="Begin at HH:MM[:SS], or at a date with a time.")
 @click.option(
     "-d",
@@ -29,7 +30,7 @@ from .panel import ascii_option, bell_option, low_bandwidth_option, mouse_option
 @bell_option
 @ascii_option
 def replay(
-    file: Path,
+    source: str,
     at: str | None,
     device: int | None,
     low_bandwidth: bool,
@@ -39,15 +40,19 @@ def replay(
 ) -> None:
     """Show a record of a line, or of `drivepanel record`, as the panel showed the drives then.
 
+    A FOLDER with the files of one line, or a LINE of this computer, is shown over all its days.
     Nothing is sent to a drive. Times without a date are local.
     """
     from tui.bus.errors import LinkSyntaxError
     from tui.session.connect.line_key import REPLAY_PREFIX
-    from tui.session.record.replay_text import ReplayText, open_replay
+    from tui.session.connect.recorded_line import replayed
+    from tui.session.record.replay_text import ReplayText
 
-    wanted = ReplayText(file.absolute(), at or "")
+    path = Path(source)
+    wanted = ReplayText(path.absolute() if path.exists() else path, at or "")
+    text = f"{REPLAY_PREFIX}{wanted.text}"
     try:
-        line = open_replay(wanted)
+        line = replayed(text)
     except LinkSyntaxError as error:
         raise Failure(str(error), USAGE) from error
     line.close()
@@ -55,7 +60,7 @@ def replay(
         known = ", ".join(map(str, line.devices)) or "none"
         raise Failure(f"Drive {device} is not in the record. Its drives: {known}.", USAGE)
     run_panel(
-        f"{REPLAY_PREFIX}{wanted.text}",
+        text,
         device,
         low_bandwidth=low_bandwidth,
         mouse=mouse,

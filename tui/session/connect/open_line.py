@@ -92,9 +92,9 @@ class OpenLine:
             self.private.cleanup()
 
     def recorded_files(self) -> list[Path]:
-        """Return the files of the line's record, or the one that is replayed. Raises OSError."""
+        """Return the files of the line's record, or those that are replayed. Raises OSError."""
         if self.replay is not None:
-            return [self.replay.path]
+            return self.replay.files
         return self.recorder.files() if self.recorder is not None else []
 
     def record_privately(self) -> None:
@@ -188,9 +188,9 @@ def check_line(text: str) -> None:
         except SimulatorError as error:
             raise LinkSyntaxError(str(error)) from error
     elif is_replay(text):
-        from ..record.replay_text import open_replay, parse_replay
+        from .recorded_line import replayed
 
-        open_replay(parse_replay(text[len(REPLAY_PREFIX) :])).close()
+        replayed(text).close()
     else:
         from tui.bus.link import parse_link
 
@@ -240,9 +240,10 @@ def _simulated(
 
 
 def _replayed(text: str, wait: float | None) -> OpenLine:
-    from ..record.replay_text import REPLAY_LEAD, open_replay, parse_replay
+    from ..record.replay_text import REPLAY_LEAD
+    from .recorded_line import replayed
 
-    line = open_replay(parse_replay(text[len(REPLAY_PREFIX) :]), lead=REPLAY_LEAD)
+    line = replayed(text, lead=REPLAY_LEAD)
     return _opened(OpenLine(text, line, devices=line.devices, replay=line), wait)
 
 

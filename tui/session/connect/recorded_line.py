@@ -27,12 +27,14 @@ from ..event_notes import EVENTS_OF_LINE, PROFILE_OF_DRIVE, LeftEvent
 from ..record.recorder import LineRecorder
 from ..record.ring import files_of_line, record_folder
 from ..record.schema import EventRow, to_microseconds
-from .line_key import line_key
+from .line_key import REPLAY_PREFIX, line_key
 from .named_lines import line_settings
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
     from tui.bus.notes import LineNote
+
+    from ..record.replay_line import ReplayLine
 
 RECORD_SETTING = "DRIVEPANEL_RECORD"
 """Environment variable: `off` or `on`, instead of the settings file."""
@@ -73,6 +75,17 @@ def record_files(source: str) -> list[Path]:
     if (path := Path(source)).is_file():
         return [path]
     return files_of_line(record_folder(), file_name_of(line_key(source)))
+
+
+def replayed(text: str, *, lead: float = 0.0) -> ReplayLine:
+    """Open `replay:FILE,at=TIME`, with a folder of files or a recorded line instead of a file.
+
+    Raises LinkSyntaxError.
+    """
+    from ..record.replay_text import open_replay, parse_replay
+
+    wanted = parse_replay(text[len(REPLAY_PREFIX) :])
+    return open_replay(wanted, record_files(str(wanted.path)), lead=lead)
 
 
 def may_record() -> bool:

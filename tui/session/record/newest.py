@@ -100,9 +100,9 @@ class RecordedReply(NamedTuple):
 class ReplayReader(RecordReader):
     """The queries of a replay; for any thread that holds the lock of its line."""
 
-    def __init__(self, path: Path) -> None:
-        """Open a record. Raises RecordDamaged, sqlite3.Error."""
-        super().__init__(path, any_thread=True)
+    def __init__(self, *paths: Path) -> None:
+        """Open the files of a line, the oldest first. Raises RecordDamaged, sqlite3.Error."""
+        super().__init__(*paths, any_thread=True)
 
     def devices(self) -> tuple[int, ...]:
         """Return the devices that have answered."""

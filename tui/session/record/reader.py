@@ -19,7 +19,10 @@ from .schema import (
     RecordDamaged,
     ReplyRow,
 )
+from .unfolding import unfold
 
+MOST_FILES = 11
+"""Files that are read as one: SQLite joins no more."""
 ROWS_AT_A_TIME = 1000
 """Rows of one query: a longer one would keep the writer from emptying the file's log."""
 
@@ -84,19 +87,33 @@ class ReducedWord(NamedTuple):
 
 
 class RecordReader:
-    """One file, opened read-only. Its methods raise sqlite3.Error."""
+    """A record of one line, opened read-only. Its methods raise sqlite3.Error.
 
-    def __init__(self, path: Path, *, any_thread: bool = False) -> None:
-        """Open a record. Raises RecordDamaged if it is not one of this version, sqlite3.Error.
+    After a jump of the clock back, times before it are shown by the clock after it.
+    """
 
-        With `any_thread`, the caller lets one thread use it at a time.
+    def __init__(self, path: Path, *following: Path, any_thread: bool = False) -> None:
+        """Open a file, and those of later days: MOST_FILES at most.
+
+        Raises RecordDamaged if one is not a record of this version, sqlite3.Error. With
+        `any_thread`, the caller lets one thread use it at a time.
         """
-        self._base = sqlite3.connect(
-            f"file:{quote(str(path))}?mode=ro", uri=True, check_same_thread=not any_thread
-        )
-        number = [self._base.execute(f"PRAGMA {name}").fetchone()[0] for name in _MARKS]
-        if number != list(_MARKS.values()):
+        self._base = sqlite3.connect(_uri(path), uri=True, check_same_thread=not any_thread)
+        try:
+            files = ["main"]
+            for number, other in enumerate(following):
+                self._base.execute(f"ATTACH ? AS day{number}", (_uri(other),))
+                files.append(f"day{number}")
+            for file, opened in zip(files, (path, *following), strict=True):
+                self._check(file, opened)
+            unfold(self._base, files)
+        except BaseException:
             self._base.close()
+            raise
+
+    def _check(self, file: str, path: Path) -> None:
+        number = [self._base.execute(f"PRAGMA {file}.{name}").fetchone()[0] for name in _MARKS]
+        if number != list(_MARKS.values()):
             text = NEWER if number[0] == RECORD_ID and number[1] > RECORD_VERSION else OTHER
             raise RecordDamaged(text.format(number[1], RECORD_VERSION), path)
 
@@ -237,6 +254,10 @@ class RecordReader:
             (since, until),
         )
         return [EventRow(*row) for row in found]
+
+
+def _uri(path: Path) -> str:
+    return f"file:{quote(str(path))}?mode=ro"
 
 
 def _words(data: bytes, index: int, count: int) -> tuple[int, ...]:

@@ -41,6 +41,7 @@ from tui.bus.tally import Tally
 from tui.bus.trace import Frame
 
 from .newest import MeanOf, NewestReplies, RecordedReply, ReplayReader
+from .reader import MOST_FILES
 from .rebuilt_frames import frames_of
 from .replay_clock import ReplayClock
 from .replay_wire import replayed_link, wire_frame
@@ -69,13 +70,22 @@ class ReplayLine:
     A drive that did not answer then does not answer now. What was never read raises NotRecorded.
     """
 
-    def __init__(self, path: Path, at: float | None = None, *, lead: float = 0.0) -> None:
+    def __init__(
+        self,
+        path: Path,
+        at: float | None = None,
+        *,
+        lead: float = 0.0,
+        files: Sequence[Path] = (),
+    ) -> None:
         """Open a record, `lead` seconds before a time (since 1970; default: its begin).
 
-        Raises RecordDamaged, sqlite3.Error.
+        `files` are those of `path`, the oldest first, if it is not a file. Raises RecordDamaged,
+        sqlite3.Error.
         """
         self.path = path
-        self._reader = ReplayReader(path)
+        self.files = list(files)[-MOST_FILES:] or [path]
+        self._reader = ReplayReader(*self.files)
         try:
             begin, end = (time / 1e6 for time in self._reader.span(path))
             self.recorded_line = self._reader.line

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
+from collections.abc import Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
@@ -10,6 +11,7 @@ from typing import NamedTuple
 from tui.bus.errors import LinkSyntaxError
 
 from .replay_line import ReplayLine
+from .ring import DAMAGED_MARK, files_of_line
 from .schema import RecordDamaged
 
 REPLAY_LEAD = 600.0
@@ -19,10 +21,11 @@ _TIMES = ("%H:%M", "%H:%M:%S", "%H:%M:%S.%f")
 
 
 class ReplayText(NamedTuple):
-    """A file and the time at which its replay begins, as typed; empty for its begin."""
+    """A file, a folder of files or a line, and the time at which its replay begins, as typed."""
 
     path: Path
     at: str = ""
+    """Empty for the begin."""
 
     @property
     def text(self) -> str:
@@ -38,22 +41,36 @@ def parse_replay(text: str) -> ReplayText:
     return ReplayText(Path(path).expanduser(), at.strip())
 
 
-def open_replay(wanted: ReplayText, *, lead: float = 0.0) -> ReplayLine:
-    """Open a record for a replay. Raises LinkSyntaxError."""
+def open_replay(wanted: ReplayText, files: Sequence[Path] = (), *, lead: float = 0.0) -> ReplayLine:
+    """Open a record for a replay. `files` are those of the line, if it names one.
+
+    Raises LinkSyntaxError.
+    """
     path = wanted.path
-    if not path.is_file():
+    found = [path] if path.is_file() else _files_in(path) if path.is_dir() else [*files]
+    if not found:
         raise LinkSyntaxError(f"{path} is not a file. Name a record, as in docs/recording.md.")
     try:
-        line = ReplayLine(path)
+        line = ReplayLine(path, files=found)
         if not wanted.at:
             return line
         at = time_in(wanted.at, line.clock.begin, line.clock.end)
         line.close()
-        return ReplayLine(path, at, lead=lead)
+        return ReplayLine(path, at, lead=lead, files=found)
     except RecordDamaged as error:
         raise LinkSyntaxError(f"{path} cannot be replayed: {error}.") from error
     except (OSError, sqlite3.Error) as error:
         raise LinkSyntaxError(f"{path} cannot be replayed: {error}.") from error
+
+
+def _files_in(folder: Path) -> list[Path]:
+    """Return the files of the one line in a folder, the oldest day first."""
+    found = [path for path in files_of_line(folder, "*") if DAMAGED_MARK not in path.name]
+    names = {path.stem.partition("_")[2] for path in found}
+    if len(names) > 1:
+        text = f"{folder} has files of several lines: {', '.join(sorted(names))}."
+        raise LinkSyntaxError(f"{text} Name one file, or the line.")
+    return found
 
 
 def time_in(text: str, begin: float, end: float) -> float:
