@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from ..schema import ProfileData
 from ..toml_lines import TomlPath
-from . import charts, limits, names, parameters, registers, signal_paths
+from . import charts, commands, limits, meanings, names, parameters, registers, signal_paths
 
 Finding = tuple[TomlPath, str]
 """Place of an error, and the error."""
@@ -17,6 +17,8 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     *names.NAME_RULES,
     *limits.LIMIT_RULES,
     *charts.CHART_RULES,
+    *commands.COMMAND_RULES,
+    *meanings.MEANING_RULES,
     *signal_paths.PATH_RULES,
 )
 

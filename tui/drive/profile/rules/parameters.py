@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
 from tui.drive.values import raw_range, type_range
 
@@ -29,24 +30,78 @@ def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 f" {seen[parameter.quantity]}; a quantity has one parameter at most.",
             )
         seen.setdefault(parameter.quantity, parameter.code)
+    yield from _twice(_once_in_other_case(data), "code {} differs from another only in its case.")
+    whole = [(n, p) for n, p in enumerate(data.parameters) if p.mask == 0xFFFF and not p.shift]
     yield from _twice(
-        ((("functions", n, "code"), f.code) for n, f in enumerate(data.functions)),
-        "function {} is declared twice.",
+        ((("parameters", n, "number"), p.number) for n, p in whole),
+        "number {} is already used by a parameter above.",
     )
-    yield from _twice(
-        ((("faults", "codes", n, "raw"), f.raw) for n, f in enumerate(data.faults.codes)),
-        "fault {} occurs twice; a raw code means one fault.",
-    )
-    for table in ("sources", "enumerations", "charts", "blocks", "control_sources", "signal_paths"):
-        rows = getattr(data, table)
+    for path, rows, key, text in _unique_rows(data):
         yield from _twice(
-            (((table, n, "id"), row.id) for n, row in enumerate(rows)),
-            f"id {{}} occurs twice in {table}.",
+            (((*path, n, key), getattr(row, key)) for n, row in enumerate(rows)), text
         )
-    yield from _twice(
-        ((("groups", n, "name"), g.name) for n, g in enumerate(data.groups)),
-        "group {!r} occurs twice.",
-    )
+    for index, parameter in enumerate(data.parameters):
+        at: TomlPath = ("parameters", index)
+        named = ((*at, "values"), parameter.values.values()), ((*at, "bits"), _bit_names(parameter))
+        for place, names in named:
+            yield from _twice(
+                ((place, name) for name in names),
+                f"parameter {parameter.code}: the name {{!r}} occurs twice.",
+            )
+
+
+def _once_in_other_case(data: ProfileData) -> Iterator[tuple[TomlPath, object]]:
+    """Yield each code once, without case: a code finds its parameter in any case."""
+    for code, n in {p.code: n for n, p in enumerate(data.parameters)}.items():
+        yield ("parameters", n, "code"), code.lower()
+
+
+def _bit_names(parameter: Parameter) -> list[str]:
+    """Return the names of bits whose meaning does not depend on other bits."""
+    return [bit.name for bit in parameter.bits if bit.counts is None]
+
+
+UNIQUE_ROWS = (
+    (("parameters",), "name", "name {!r} is already used by a parameter above."),
+    (("functions",), "code", "function {} is declared twice."),
+    (("exceptions",), "code", "exception {} occurs twice."),
+    (("references",), "parameter", "reference {} occurs twice."),
+    (("monitoring", "values"), "parameter", "{} is monitored twice."),
+    (("identification", "objects"), "id", "object {} occurs twice."),
+    (("link", "settings"), "parameter", "setting {} occurs twice."),
+    (("communication_fault", "reactions"), "raw", "reaction {} occurs twice."),
+    (("faults", "codes"), "raw", "fault {} occurs twice; a raw code means one fault."),
+    (("groups",), "name", "group {!r} occurs twice."),
+    *(
+        ((table,), "id", f"id {{}} occurs twice in {table}.")
+        for table in (
+            "sources",
+            "enumerations",
+            "charts",
+            "blocks",
+            "control_sources",
+            "signal_paths",
+        )
+    ),
+)
+"""Rows of which one field must be unique, with its error."""
+
+
+def _unique_rows(
+    data: ProfileData,
+) -> Iterator[tuple[TomlPath, Sequence[object], str, str]]:
+    for path, key, text in UNIQUE_ROWS:
+        rows: Any = data
+        for name in path:
+            rows = getattr(rows, name) if rows is not None else None
+        yield path, rows or (), key, text
+    for index, chart in enumerate(data.charts):
+        for table in ("states", "options"):
+            text = f"chart {chart.id}: id {{}} occurs twice in {table}."
+            yield ("charts", index, table), getattr(chart, table), "id", text
+    for index, setting in enumerate(data.link.settings):
+        at: TomlPath = ("link", "settings", index, "choices")
+        yield at, setting.choices, "raw", f"{setting.parameter}: choice {{}} occurs twice."
 
 
 def _twice(rows: Iterable[tuple[TomlPath, object]], text: str) -> Iterator[tuple[TomlPath, str]]:

@@ -1,0 +1,285 @@
+"""Rules for the meaning of values: units, words that are read, and settings of the line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from tui.drive.values import raw_range
+
+from ..schema import Parameter, ProfileData
+from ..toml_lines import TomlPath
+
+TIME_UNITS = ("s", "ms", "min")
+SPEED_UNITS = ("Hz", "rpm", "%")
+RAMP_UNITS = (*TIME_UNITS, "Hz/s", "rpm/s")
+NO_UNIT = ("",)
+QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
+    "output_frequency": SPEED_UNITS,
+    "frequency_reference": SPEED_UNITS,
+    "ramp_output": SPEED_UNITS,
+    "command_frequency": SPEED_UNITS,
+    "command_speed": SPEED_UNITS,
+    "speed": SPEED_UNITS,
+    "speed_reference": SPEED_UNITS,
+    "high_speed": SPEED_UNITS,
+    "low_speed": SPEED_UNITS,
+    "max_frequency": SPEED_UNITS,
+    "rated_frequency": ("Hz",),
+    "rated_speed": ("rpm",),
+    **{f"preset_speed_{number}": SPEED_UNITS for number in range(1, 8)},
+    "acceleration": RAMP_UNITS,
+    "deceleration": RAMP_UNITS,
+    "acceleration_2": RAMP_UNITS,
+    "deceleration_2": RAMP_UNITS,
+    "motor_current": ("A", "mA", "%"),
+    "rated_current": ("A", "mA", "%"),
+    "thermal_current": ("A", "mA", "%"),
+    "drive_current": ("A", "mA"),
+    "motor_voltage": ("V", "%"),
+    "rated_voltage": ("V", "%"),
+    "mains_voltage": ("V", "%"),
+    "dc_bus": ("V", "%"),
+    "torque": ("%", "Nm"),
+    "power": ("kW", "W", "hp", "%"),
+    "input_power": ("kW", "W", "hp", "%"),
+    "switching_frequency": ("kHz", "Hz"),
+    "run_hours": ("h", "min", "s", "d"),
+    "power_on_hours": ("h", "min", "s", "d"),
+    "line_timeout": TIME_UNITS,
+    "status_word": NO_UNIT,
+    "status_word_2": NO_UNIT,
+    "status_word_3": NO_UNIT,
+    "extended_status_word": NO_UNIT,
+    "command_word": NO_UNIT,
+    "command_word_2": NO_UNIT,
+    "extended_command_word": NO_UNIT,
+    "alarm_word": NO_UNIT,
+    "fault": NO_UNIT,
+    "motor_poles": NO_UNIT,
+}
+"""Units that a quantity can have; a value shown raw has none."""
+STATUS_QUANTITIES = frozenset(
+    {None, "status_word", "status_word_2", "status_word_3", "extended_status_word", "alarm_word"}
+)
+PORT_BAUDS = frozenset(
+    {300, 600, 1200, 1800, 2400, 4800, 9600, 14400, 19200, 28800, 38400, 57600, 76800, 115200}
+    | {125000, 128000, 187500, 230400, 250000, 256000, 460800, 500000, 576000, 921600, 1000000}
+)
+"""Baud rates of serial ports and of drives."""
+_FORMAT = re.compile(r"8[NEO][12]")
+
+
+def fitting_units(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield quantities in an impossible unit, and limits whose unit differs."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    for index, parameter in enumerate(data.parameters):
+        at: TomlPath = ("parameters", index)
+        fits = QUANTITY_UNITS.get(parameter.quantity or "", ())
+        if fits and parameter.unit and parameter.unit not in fits and not parameter.unit_by:
+            allowed = ", ".join(filter(None, fits)) or "none"
+            yield (
+                (*at, "unit"),
+                f"parameter {parameter.code}: {parameter.quantity} in {parameter.unit!r} is not"
+                f" possible. Allowed: {allowed}.",
+            )
+        for key, code in (("min_from", parameter.min_from), ("max_from", parameter.max_from)):
+            other = parameters.get(code)
+            if other and other.unit != parameter.unit and parameter.unit and other.unit:
+                yield (
+                    (*at, key),
+                    f"parameter {parameter.code}: its limit {code} is in {other.unit}, not"
+                    f" {parameter.unit}.",
+                )
+
+
+def references_usable(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield references that cannot be written, or whose unit is missing or of something else."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    for index, way in enumerate(data.references):
+        at: TomlPath = ("references", index)
+        feedback = parameters.get(way.feedback)
+        if feedback is not None and feedback.access == "w":
+            yield (*at, "feedback"), f"reference: its feedback {way.feedback} cannot be read."
+        parameter = parameters.get(way.parameter)
+        if parameter is None:
+            continue
+        place = (*at, "parameter")
+        if parameter.access == "r" or parameter.forbidden:
+            yield place, f"reference {parameter.code} cannot be written."
+        elif parameter.access == "rw-stopped":
+            yield place, f"reference {parameter.code} cannot be changed while the motor turns."
+        wrong = "rpm" if way.kind == "frequency" else "Hz"
+        if not parameter.unit:
+            yield place, f"reference {parameter.code} has no unit. Never guess a scale."
+        elif parameter.unit == wrong or parameter.unit not in (*SPEED_UNITS, "V"):
+            yield place, f"reference {parameter.code} is a {way.kind} in {parameter.unit!r}."
+
+
+def time_of_timeouts(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield communication timeouts without a unit of time."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    watch = data.communication_fault
+    for code in (watch.timeout, *watch.other_timeouts) if watch else ():
+        parameter = parameters.get(code)
+        if parameter is not None and parameter.unit not in TIME_UNITS:
+            key = "timeout" if watch and code == watch.timeout else "other_timeouts"
+            yield (
+                ("communication_fault", key),
+                f"timeout {code} has the unit {parameter.unit!r}. Allowed: s, ms, min.",
+            )
+
+
+def words_are_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield status, command and fault words that are measurements, and values never readable."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    for index, chart in enumerate(data.charts):
+        at: TomlPath = ("charts", index)
+        status = parameters.get(chart.status)
+        if status is not None and (_measures(status) or status.quantity not in STATUS_QUANTITIES):
+            what = status.quantity if status.quantity not in STATUS_QUANTITIES else "a measurement"
+            yield (
+                (*at, "status"),
+                f"chart {chart.id}: {status.code} is {what}, not a status word.",
+            )
+        if chart.command and chart.status == chart.command:
+            yield (
+                (*at, "status"),
+                f"chart {chart.id}: {chart.status} is its command word. A status word is the"
+                " drive's own, or a command would be taken for its effect.",
+            )
+        command = parameters.get(chart.command)
+        if command is not None and _measures(command):
+            yield (
+                (*at, "command"),
+                f"chart {chart.id}: {command.code} has a unit or a scale. A command word has none.",
+            )
+    fault = parameters.get(data.faults.parameter)
+    if fault is not None and _measures(fault):
+        yield ("faults", "parameter"), f"faults: {fault.code} is a measurement, not a fault word."
+    for place, value in enumerate(data.monitoring.values):
+        shown = parameters.get(value.parameter)
+        if shown is not None and shown.access == "w":
+            yield ("monitoring", "values", place), f"monitoring: {shown.code} cannot be read."
+
+
+def _measures(parameter: Parameter) -> bool:
+    return bool(parameter.unit or parameter.scale_by) or float(parameter.scale) != 1
+
+
+def keys_are_values(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield keys of `scale_by`, `unit_by` and `factory_by` that their parameter cannot hold."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    names = {row.id: row.values for row in data.enumerations}
+    for index, parameter in enumerate(data.parameters):
+        by = (
+            ("scale_by", parameter.scale_by, parameter.scale_by and parameter.scale_by.scales),
+            (
+                "factory_by",
+                parameter.factory_by,
+                parameter.factory_by and parameter.factory_by.raws,
+            ),
+        )
+        for key, row, keys in by:
+            of = parameters.get(row.parameter) if row else None
+            if of is None:
+                continue
+            known = {**names.get(of.enumeration, {}), **of.values}
+            for raw in keys or ():
+                if raw.lstrip("-").isdecimal() and raw not in known and (known or _beyond(of, raw)):
+                    yield (
+                        ("parameters", index, key),
+                        f"parameter {parameter.code}: {key}: {of.code} has no value {raw}.",
+                    )
+        if (unit := parameter.unit_by) is not None:
+            for raw in unit.units:
+                if raw.isdecimal() and int(raw) & ~unit.mask:
+                    yield (
+                        ("parameters", index, "unit_by"),
+                        f"parameter {parameter.code}: unit_by: {raw} does not fit the mask.",
+                    )
+
+
+def _beyond(parameter: Parameter, raw: str) -> bool:
+    low, high = raw_range(parameter)
+    return not low <= int(raw) <= high
+
+
+def settings_of_the_line(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield rates and formats that no port has, and slave addresses in the wrong order."""
+    link = data.link
+    bauds: list[tuple[TomlPath, int]] = [(("link", "baud"), link.baud)]
+    bauds += [(("link", "bauds", place), baud) for place, baud in enumerate(link.bauds)]
+    for index, setting in enumerate(link.settings):
+        for place, choice in enumerate(setting.choices):
+            if choice.baud is not None:
+                bauds.append((("link", "settings", index, "choices", place), choice.baud))
+    for at, baud in bauds:
+        if baud not in PORT_BAUDS:
+            yield at, f"no port has {baud} baud."
+    if link.bauds and link.baud not in link.bauds:
+        yield ("link", "baud"), f"baud {link.baud} is not among its bauds."
+    for place, form in enumerate(link.formats):
+        if not _FORMAT.fullmatch(form):
+            yield ("link", "formats", place), f"{form!r} is not a format such as 8E1 or 8N2."
+    if link.formats and link.format not in link.formats:
+        yield ("link", "format"), f"format {link.format} is not among its formats."
+    slaves = data.addresses
+    if slaves.first > slaves.last:
+        yield ("addresses", "first"), f"first {slaves.first} is above last {slaves.last}."
+
+
+def writable_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield settings that the profile proposes although they cannot be written."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    places: list[tuple[TomlPath, str]] = [
+        (("memory", key), order.parameter)
+        for key, order in (("save", data.memory.save), ("factory", data.memory.factory))
+        if order is not None
+    ]
+    for index, source in enumerate(data.control_sources):
+        for place, setting in enumerate(source.settings):
+            places.append((("control_sources", index, "settings", place), setting.parameter))
+    for at, code in places:
+        parameter = parameters.get(code)
+        if parameter is not None and (parameter.access == "r" or parameter.forbidden):
+            yield at, f"{code} cannot be written."
+
+
+def readable_pairs(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield parameters of two words of which a read holds only one."""
+    most = {function.code: function.max_read for function in data.functions}
+    for index, parameter in enumerate(data.parameters):
+        if parameter.type.endswith("32") and most.get(parameter.function) == 1:
+            yield (
+                ("parameters", index, "type"),
+                f"parameter {parameter.code}: {parameter.type} is two words, but function"
+                f" {parameter.function} reads one (max_read).",
+            )
+
+
+def monitored_bars(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield bars that end below their beginning."""
+    for place, value in enumerate(data.monitoring.values):
+        try:
+            inverted = float(value.low) >= float(value.high)
+        except ValueError:  # an end is a parameter, or absent
+            continue
+        if inverted:
+            yield (
+                ("monitoring", "values", place),
+                f"monitoring: {value.parameter}: low {value.low} is not below high {value.high}.",
+            )
+
+
+MEANING_RULES = (
+    fitting_units,
+    references_usable,
+    time_of_timeouts,
+    words_are_words,
+    keys_are_values,
+    settings_of_the_line,
+    writable_settings,
+    readable_pairs,
+    monitored_bars,
+)
