@@ -184,6 +184,12 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "CONTROL has a unit or a scale",
         'command = "CONTROL"',
     ),
+    "a stop in a setting": (
+        "ms",
+        STOP,
+        STOP.replace("words", 'parameter = "01-13", words'),
+        "01-13 has a unit or a scale. A command word has none",
+    ),
     "a command in a part of a word": (
         "ms",
         "address = 0x2002\n",

@@ -11,6 +11,7 @@ from tui.drive.plain import plain
 from tui.drive.sentences import counted
 
 from ..shared.completion import complete_profile
+from ..shared.errors import DIFFERENT
 from ..shared.options import json_option
 from ..shared.registration import command
 from ..shared.rows import GAP, Column, row_text, table_of
@@ -33,7 +34,7 @@ PARAMETER_COLUMNS = (
 )
 
 
-@command("List, show or check drive profiles.", group="Profiles")
+@command("List, show or check drive profiles.", group="Profiles", statuses=(DIFFERENT,))
 @click.argument(
     "profile_id",
     required=False,
@@ -48,6 +49,13 @@ PARAMETER_COLUMNS = (
     metavar="FILE...",
     help="Check profile files and list each error with its line.",
 )
+@click.option(
+    "--prove",
+    "proved",
+    type=click.Path(path_type=Path),
+    metavar="FILE...",
+    help="Test profile files on the drives simulated from them.",
+)
 @click.option("--from", "origin", metavar="ID", help="Copy this profile; for new.")
 @click.option("--schema", is_flag=True, help="Print the JSON schema: every field, described.")
 @click.option(
@@ -60,6 +68,7 @@ def profiles(
     profile_id: str | None,
     more: tuple[str, ...],
     file: Path | None,
+    proved: Path | None,
     origin: str | None,
     schema: bool,
     wiring: bool,
@@ -74,7 +83,11 @@ def profiles(
     from tui.drive.profile import library
 
     words = (*((profile_id,) if profile_id is not None else ()), *more)
-    if file is not None:
+    if proved is not None:
+        from ..running.profile_proof import prove_files
+
+        prove_files([given_file(path) for path in (proved, *map(Path, words))], as_json)
+    elif file is not None:
         check_files([given_file(path) for path in (file, *map(Path, words))], as_json)
     elif schema:
         from tui.drive.profile.json_schema import schema_text

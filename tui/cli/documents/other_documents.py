@@ -195,6 +195,28 @@ class CheckDocument(Document, kw_only=True):
     faults: list[str]
 
 
+class ProofStepField(DocumentPart, kw_only=True):
+    """A step of `profiles --prove`."""
+
+    name: str
+    passed: bool
+    file: str | None
+    """File with the claim that failed; null if it passed."""
+    line: int | None
+    fault: str | None
+
+
+class ProofDocument(Document, kw_only=True):
+    """`profiles --prove`: one file of the list."""
+
+    command: Literal["profiles"] = "profiles"
+    file: str
+    passed: bool
+    faults: list[str]
+    """Faults that `--check` reports; with one, no step was carried out."""
+    steps: list[ProofStepField]
+
+
 class ProfileBegun(Document, kw_only=True):
     """`profiles new`."""
 

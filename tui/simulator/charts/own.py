@@ -67,7 +67,10 @@ class OwnOrders:
         return self._same(chart, where, raw, step.command or 0)
 
     def complete(self, chart: Chart, state: State, where: Parameter, raw: int) -> Order | None:
-        """Return the command that a written word completes in this state."""
+        """Return the command that a written word completes in this state.
+
+        Of several, the longest: the 0 at the end of a reset is not the stop.
+        """
         raws = self._raws()
         done = None
         for place, order in enumerate(chart.orders):
@@ -80,7 +83,7 @@ class OwnOrders:
                 continue
             come = self._next(chart, where, raw, order, come)
             self._places[place] = come % len(order.words)
-            if come == len(order.words) and done is None:
+            if come == len(order.words) and (done is None or come > len(done.words)):
                 done = order
         if done is not None and locked_by(chart, done.id, raws) is not None:
             return None
@@ -139,6 +142,17 @@ def with_bit(chart: Chart, word: int, bit: int, *, on: bool) -> int:
     """Return a status word with a bit of separate meaning, unless that would show another state."""
     marked = word | 1 << bit if on else word & ~(1 << bit)
     return marked if state_of(chart, marked) is state_of(chart, word) else word
+
+
+def _agrees(order: Order, led: State) -> bool:
+    """Return True if a transition leads a command to where its name says.
+
+    If not, the drive follows the transition: a stop whose word leads to a running state stops
+    nothing.
+    """
+    if order.id in ("forward", "reverse"):
+        return led.kind == "running"
+    return order.id not in (*STOPS_BY_ORDER, "reset") or led.kind != "running"
 
 
 OWN_REACHED_HZ = 0.1
@@ -217,10 +231,11 @@ class OwnChart:
         target = self._orders.transition(chart, state, parameter, raw)
         order = self._orders.complete(chart, state, parameter, raw)
         self._orders.note(parameter, raw)
-        if order is not None:
+        led = next((item for item in chart.states if item.id == target), None)
+        if order is not None and (led is None or _agrees(order, led)):
             self._obey(order)
-        elif target:
-            self._go(next(item for item in chart.states if item.id == target))
+        elif led is not None:
+            self._go(led)
         if target and not self._runs:
             self._rest_in(chart, target)
 

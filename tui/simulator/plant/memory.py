@@ -32,14 +32,32 @@ class SettingsMemory:
 
     def written(self, parameter: Parameter) -> None:
         """Process a word that the line wrote."""
-        if parameter.quantity == "extended_command_word":
-            self._extended(parameter)
-        elif parameter.quantity == "save_settings" and self._body.registers.present(parameter):
+        own = self._body.traits.kind == "own"
+        if parameter.quantity == "save_settings" and self._body.registers.present(parameter):
             self._save()
             self._body.registers.put(parameter, 0)
+        elif own:
+            self._declared(parameter)
+        elif parameter.quantity == "extended_command_word":
+            self._extended(parameter)
         elif self._body.traits.access_levels and parameter.code.casefold() == "lac":
             self._access_level(parameter)
         self._follow(parameter)
+
+    def _declared(self, parameter: Parameter) -> None:
+        """Carry out the commands to the memory that a profile of any make declares."""
+        memory, raw = self._body.profile.data.memory, self._body.registers.present(parameter)
+        for order, save in ((memory.save, True), (memory.factory, False)):
+            if order is None or order.parameter != parameter.code or self._body.turning:
+                continue
+            if raw != order.raw and not (order.bit and raw & order.raw == order.raw):
+                continue
+            if save:
+                self._save()
+            else:
+                self._body.registers.to_factory(self._kept())
+            if not order.keeps_value:
+                self._body.registers.put(parameter, raw & ~order.raw if order.bit else 0)
 
     def _follow(self, source: Parameter) -> None:
         """Set the values whose factory settings depend on this one (HSP after bFr)."""

@@ -122,6 +122,8 @@ class SilenceWatch:
         if self._data is None or not self._data.reaction:
             return FREEWHEEL
         raw = self._body.setting(self._data.reaction, -1)
+        if self._body.traits.kind == "own":
+            return _declared(next((r for r in self._data.reactions if r.raw == raw), None))
         if self._body.traits.kind == "altivar21":
             return ALTIVAR_21_REACTIONS.get(raw, FREEWHEEL)
         reaction = next((r for r in self._data.reactions if r.raw == raw), None)
@@ -130,8 +132,24 @@ class SilenceWatch:
 
     @property
     def fault(self) -> int | None:
-        """Return the raw code of the communication fault, if the profile has it."""
-        return self._data.fault if self._data else None
+        """Return the raw code of the communication fault.
+
+        If the profile has none, it is a number without a name: a drive in fault never shows none.
+        """
+        if self._data is None or self._data.fault is not None:
+            return self._data.fault if self._data else None
+        faults = self._body.profile.data.faults
+        known = {faults.none, *(fault.raw for fault in faults.codes)}
+        return next(raw for raw in range(1, 0x10000) if raw not in known)
+
+
+def _declared(reaction: Reaction | None) -> Consequence:
+    """Return a reaction of any make, as its row describes it."""
+    if reaction is None or (reaction.trips and _code(reaction) not in ALTIVAR_REACTIONS):
+        return FREEWHEEL
+    if reaction.trips:
+        return ALTIVAR_REACTIONS[_code(reaction)]
+    return Consequence(fallback=None if reaction.motor_keeps_running else Fallback.STOP)
 
 
 def _code(reaction: Reaction | None) -> str:

@@ -9,7 +9,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Function, Multiple, Parameter
 from tui.drive.settings.multiple import counts_of
 from tui.drive.shown import depends_on
-from tui.drive.values import from_words, is_enumeration, raw_range, to_words, word_count
+from tui.drive.values import from_words, is_enumeration, is_field, raw_range, to_words, word_count
 
 from ..registers import INPUT_REGISTERS, Registers
 from ..rules import Traits
@@ -168,11 +168,20 @@ class DriveWords:
         parameter = self._registers.owner(address) if address <= 0xFFFF else None
         if parameter is None:
             raise Refused(self._refusals.unknown_address)
-        if not self._may_be_written(parameter) or word_count(parameter) == 2:
-            return
         if self._unlimited():
             return
-        raw = from_words(parameter, [word])
+        for part in self._parts(parameter):
+            if self._may_be_written(part) and word_count(part) == 1:
+                self._check_raw(part, from_words(part, [word]))
+
+    def _parts(self, parameter: Parameter) -> list[Parameter]:
+        """Return the parameters that share a register with this one, itself included."""
+        if not is_field(parameter):
+            return [parameter]
+        place = (parameter.function, parameter.address)
+        return [p for p in self._profile.parameters if (p.function, p.address) == place]
+
+    def _check_raw(self, parameter: Parameter, raw: int) -> None:
         low, high = raw_range(parameter)
         names = self._profile.names(parameter)
         named = raw in names
@@ -209,7 +218,8 @@ class DriveWords:
         if self._blocked(parameter):
             raise Refused(self._refusals.not_now)
         if word_count(parameter) == 1:
-            word = to_words(parameter, self._within(parameter, from_words(parameter, [word])))[0]
+            raw = self._within(parameter, from_words(parameter, [word]))
+            word = to_words(parameter, raw, word)[0]
         self._registers.write_word(address, word)
         self._written(parameter)
 

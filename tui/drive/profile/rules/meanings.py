@@ -148,12 +148,14 @@ def words_are_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 f"chart {chart.id}: {chart.status} is its command word. A status word is the"
                 " drive's own, or a command would be taken for its effect.",
             )
-        command = parameters.get(chart.command)
-        if command is not None and _measures(command):
-            yield (
-                (*at, "command"),
-                f"chart {chart.id}: {command.code} has a unit or a scale. A command word has none.",
-            )
+        places: list[tuple[TomlPath, str]] = [((*at, "command"), chart.command)]
+        for place, order in enumerate(chart.orders):
+            places.append(((*at, "orders", place), order.parameter))
+        for path, code in places:
+            command = parameters.get(code)
+            if command is not None and _measures(command):
+                text = f"{code} has a unit or a scale. A command word has none."
+                yield path, f"chart {chart.id}: {text}"
     fault = parameters.get(data.faults.parameter)
     if fault is not None and _measures(fault):
         yield ("faults", "parameter"), f"faults: {fault.code} is a measurement, not a fault word."

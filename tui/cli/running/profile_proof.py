@@ -1,0 +1,82 @@
+"""`profiles --prove`: tests profile files on the drives that are simulated from them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from tui.drive.sentences import counted
+
+from ..documents.other_documents import ProofDocument, ProofStepField
+from ..shared.errors import DIFFERENT, USAGE, Failure
+from ..shared.output import print_json
+from ..shared.say import say
+
+if TYPE_CHECKING:
+    from tui.simulator.proving.proof_step import ProofStep
+
+ONLY_SIMULATED = (
+    "The simulated drive does what the file says. Only a real drive shows if that is true."
+)
+
+
+def prove_files(files: list[Path], as_json: bool) -> None:
+    """Test each file, and print each step.
+
+    Raises Failure with status 2 if a file has a fault that `--check` reports, with 1 if a step
+    failed.
+    """
+    documents = [_proved(path) for path in dict.fromkeys(files)]
+    if as_json:
+        print_json(documents)
+    for document in documents if not as_json else ():
+        for step in document.steps:
+            say(_step_line(step))
+        if document.passed:
+            steps = counted(len(document.steps), "1 step", "{count} steps")
+            say(f"{document.file}: {steps} passed on the simulated drive. {ONLY_SIMULATED}")
+    faults = [fault for document in documents for fault in document.faults]
+    failed = [
+        _step_line(step) for document in documents for step in document.steps if not step.passed
+    ]
+    if not faults and not failed:
+        return
+    status = USAGE if faults else DIFFERENT
+    if as_json:
+        raise click.exceptions.Exit(status)
+    if faults:
+        head = counted(len(faults), "1 fault found:", "{count} faults found:")
+        raise Failure("\n".join((head, *faults)), status)
+    head = counted(len(failed), "1 step failed:", "{count} steps failed:")
+    raise Failure("\n".join((head, *failed)), status)
+
+
+def _step_line(step: ProofStepField) -> str:
+    if step.passed:
+        return f"passed  {step.name}"
+    return f"FAILED  {step.file}:{step.line}: {step.name}: {step.fault}"
+
+
+def _proved(path: Path) -> ProofDocument:
+    """Return the result of a file; without steps if it has faults."""
+    from tui.drive.profile import library
+    from tui.simulator.proving.proof_steps import prove_profile
+
+    if faults := library.all_faults_of(path):
+        return ProofDocument(file=str(path), passed=False, faults=faults, steps=[])
+    profile = library.load_file(path)
+    steps = [_field(step, path) for step in prove_profile(profile)]
+    passed = all(step.passed for step in steps)
+    return ProofDocument(file=str(path), passed=passed, faults=[], steps=steps)
+
+
+def _field(step: ProofStep, path: Path) -> ProofStepField:
+    from tui.drive.profile import library
+    from tui.drive.profile.shared_rows import read_tables
+
+    if not step.fault:
+        return ProofStepField(name=step.title, passed=True, file=None, line=None, fault=None)
+    file, line = read_tables(path, library.packaged_folder()).place(step.path)
+    return ProofStepField(name=step.title, passed=False, file=file, line=line, fault=step.fault)
