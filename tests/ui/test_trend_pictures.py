@@ -30,8 +30,8 @@ from .test_poor_terminals import POOR
 WALL = 1_795_259_250.4
 BANDS = [TrendBand(2, "RFR"), TrendBand(2, "LCR"), TrendBand(2, "OTR")]
 FOUR = [*BANDS, TrendBand(2, "ULN")]
-LEVELS = {"RFR": 50.0, "LCR": 8.4, "OTR": 72.5, "ULN": 398.0}
-UNITS = {"RFR": "Hz", "LCR": "A", "OTR": "%", "ULN": "V"}
+LEVELS = {"RFR": 50.0, "FRH": 48.0, "LCR": 8.4, "OTR": 72.5, "ULN": 398.0}
+UNITS = {"RFR": "Hz", "FRH": "Hz", "LCR": "A", "OTR": "%", "ULN": "V"}
 
 
 @dataclass(frozen=True)
@@ -70,6 +70,8 @@ SHOWN_AT = {
 def value_of(code: str, at: float) -> float:
     """The value of a code, some seconds before the picture."""
     level = LEVELS[code]
+    if code == "FRH":
+        return level if at < 46 else 0.0
     if code == "RFR":
         return level * min(1.0, max(0.0, (44 - at) / 6))
     return level * (1 + 0.08 * math.sin(at / 4)) * (0.1 if at > 44 and code != "ULN" else 1)
@@ -120,6 +122,8 @@ def panel(
     ]
     monkeypatch.setattr(trend_loading, "read_traces", read)
     monkeypatch.setattr(trend_loading, "recorded_events", lambda *_: rows if scene.recorded else [])
+    oldest = WALL - 20 * 3600 if scene.recorded else None
+    monkeypatch.setattr(trend_loading, "oldest_reply", lambda *_: oldest)
     monkeypatch.setattr(trend_screen, "stored_bands", lambda _: list(scene.bands))
     snapshot = fakes.snapshot_of(
         library.load("atv71"), fakes.RUNNING, age=scene.age, error=scene.error

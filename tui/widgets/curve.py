@@ -54,6 +54,8 @@ class CurveSigns(NamedTuple):
     grid: str
     mark: str
     """Vertical line of a mark."""
+    dots: str
+    """Two cells of a dotted curve, for a legend."""
 
 
 _LEFT, _RIGHT = (0x40, 0x04, 0x02, 0x01), (0x80, 0x20, 0x10, 0x08)
@@ -68,10 +70,10 @@ def _braille(dots: int) -> str:
 
 
 _BRAILLE = tuple(_braille(dots) for dots in range(256))
-BRAILLE = CurveSigns(2, 4, _BRAILLE, _BRAILLE, "·", "┆")
-BLOCKS = CurveSigns(1, 2, " ▄▀█", " ▄▀█", "·", "│")
+BRAILLE = CurveSigns(2, 4, _BRAILLE, _BRAILLE, "·", "┆", "⠂⠂")
+BLOCKS = CurveSigns(1, 2, " ▄▀█", " ▄▀█", "·", "│", "▄ ")
 """For consoles whose fonts have no braille."""
-ASCII_SIGNS = CurveSigns(1, 3, ' _-|"|||', " .=:':::", " ", "!")
+ASCII_SIGNS = CurveSigns(1, 3, ' _-|"|||', " .=:':::", " ", "!", "= ")
 
 
 def curve_signs(*, plain: bool, braille: bool, colored: bool = True) -> CurveSigns:

@@ -48,6 +48,8 @@ LINE = Style(color=RULE)
 TITLE = Style(color=DIM)
 STRONG = Style(color="#ffffff", bold=True)
 KEY = Style(color=FOCUS, bold=True)
+REFERENCE_STYLE = Style(color=FOCUS)
+"""Curve of a reference."""
 FAULT = Style(color=RED, bold=True)
 FAULT_BLOCK = Style(color="#ffffff", bgcolor="#a8281f", bold=True)
 ALARM = Style(color=AMBER, bold=True)

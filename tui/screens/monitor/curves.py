@@ -37,6 +37,7 @@ from tui.widgets.palette import (
     KEY,
     LINE,
     PLAIN,
+    REFERENCE_STYLE,
     STALE,
     STRONG,
 )
@@ -46,7 +47,6 @@ from .time_axis import (
     LABEL_CELLS,
     MARGIN_CELLS,
     MARK_SIGNS,
-    REFERENCE_STYLE,
     ShownPage,
     axis_lines,
     mark_names,

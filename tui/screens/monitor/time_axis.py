@@ -26,6 +26,7 @@ from tui.widgets.palette import (
     KEY,
     LINE,
     PLAIN,
+    REFERENCE_STYLE,
     RUNNING,
     STRONG,
 )
@@ -35,7 +36,6 @@ from .view import View
 LABEL_CELLS = 5
 MARGIN_CELLS = 7
 """Cells at the right of a curve for the latest value."""
-REFERENCE_STYLE = Style(color=KEY.color)
 MARK_SIGNS: dict[TrendMark, tuple[str, Style, str]] = {
     "lost": ("×", ALARM, "no answer"),
     "trip": ("■", FAULT, "trip"),

@@ -11,7 +11,7 @@ from operator import itemgetter
 from rich.text import Text
 
 from tui.widgets.curve import CurveScale
-from tui.widgets.palette import CURSOR, FAINT, LINE
+from tui.widgets.palette import CURSOR, FAINT, KEY, LINE
 
 from .contents import AXIS_CELLS, LATEST_CELLS, TrendRoom, TrendView, mark_places, trend_plot
 from .event_list import sign_of
@@ -58,6 +58,36 @@ def trend_axis(view: TrendView, room: TrendRoom) -> list[Text]:
     if not room.clock:
         return [axis]
     return [axis, Text(" " * AXIS_CELLS, no_wrap=True).append(names, FAINT)]
+
+
+def kept_line(view: TrendView, width: int) -> Text:
+    """Return the whole record as a bar, with the page in it and the events."""
+    if view.oldest is None:
+        return Text("  Nothing is recorded of these drives.", FAINT, no_wrap=True)
+    begin, end = view.oldest, max(view.now, view.oldest + 1)
+    hours = (end - begin) / 3600
+    length = f"{hours:.0f} h" if hours >= 2 else f"{hours * 60:.0f} min"
+    first = time.strftime("%m-%d %H:%M", time.localtime(begin))
+    line = Text(f"  kept {length}  {first} ", FAINT, no_wrap=True)
+    last = time.strftime(" %H:%M", time.localtime(end))
+    count = max(1, width - line.cell_len - len(last) - 2)
+
+    def cell(moment: float) -> int:
+        return max(0, min(count - 1, int((moment - begin) / (end - begin) * count)))
+
+    cells = [("-" if view.plain else "─", LINE)] * count
+    for event in reversed(view.events):
+        if begin <= event.wall <= end:
+            cells[cell(event.wall)] = sign_of(event, view.plain)
+    page = cell(view.start), cell(min(end, view.start + view.page.step.span))
+    shown = "=" if view.plain else "━"
+    for at in range(page[0], page[1] + 1):
+        sign, style = cells[at]
+        cells[at] = (shown, CURSOR + KEY) if style is LINE else (sign, style + CURSOR)
+    line.append("|" if view.plain else "▕", LINE)
+    for style, run in groupby(cells, key=itemgetter(1)):
+        line.append("".join(sign for sign, _ in run), style)
+    return line.append("|" if view.plain else "▏", LINE).append(last, FAINT)
 
 
 def _clock_times(view: TrendView, ticks: Sequence[tuple[int, float]], columns: int) -> str:

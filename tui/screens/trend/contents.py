@@ -42,6 +42,9 @@ class BandView:
     """Why it is not read now; empty if it is."""
     note: str
     row: TableRow
+    reference: str = ""
+    """Code of the reference; empty if none is drawn."""
+    reference_points: Sequence[HistoryPoint] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +61,8 @@ class TrendView:
     """Of the page's drives, newest first."""
     event: int | None
     """Selected event while the events are open."""
+    oldest: float | None = None
+    """Begin of the record; None without any."""
     plain: bool = False
     lean: bool = False
     """True on a low-bandwidth link: no value is shown twice."""
@@ -82,6 +87,8 @@ class TrendRoom:
     marks: bool
     line: bool
     """True if the clock times, the table, the marks and the last event have rows."""
+    kept: bool
+    """True if the overview of the record has a row."""
     events: int
     """Rows of the events below the curves, instead of the table; 0 without them."""
     side: bool

@@ -12,12 +12,20 @@ from tui.session.console import DriveConsole
 from tui.session.monitor.live_trace import LiveTrace
 from tui.session.monitor.trend import readout_parameter
 from tui.session.monitor.trend_bands import TrendBand, store_bands
-from tui.session.record.history import recorded_events
+from tui.session.record.history import oldest_reply, recorded_events
 from tui.session.record.schema import EventRow
 
 from ..base import PanelScreen
+from .event_list import events_shown
 from .page import TrendPage
-from .traces import BandTrace, MarkValues, mark_values, reach_of_trace, read_traces
+from .traces import (
+    BandTrace,
+    MarkValues,
+    mark_values,
+    reach_of_trace,
+    read_traces,
+    reference_code,
+)
 
 FIRST_BANDS: tuple[Quantity, ...] = ("output_frequency", "motor_current", "torque")
 """Bands of a line without stored ones, of the open drive."""
@@ -37,6 +45,8 @@ class TrendBands(PanelScreen):
         self._lives: dict[int, LiveTrace] = {}
         self._selected = 0
         self._recorded: Sequence[EventRow] = ()
+        self._oldest: float | None = None
+        """Begin of the record of these drives; None without any."""
         self._marks: dict[TrendBand, MarkValues] = {}
         self._loading = self._load_due = False
         self._drawn_page: tuple[float, float] | None = None
@@ -59,6 +69,8 @@ class TrendBands(PanelScreen):
         ]
         wanted: dict[int, list[str]] = {}
         for trace in self.traces:
+            self._add_reference(trace)
+        for trace in self._read:
             if trace.entry is not None:
                 wanted.setdefault(trace.band.device, []).append(trace.band.code)
         past, self._lives = self._lives, {}
@@ -70,13 +82,27 @@ class TrendBands(PanelScreen):
                 self._lives[device] = LiveTrace(console.monitor, codes, self.app.period)
         for live in past.values():
             live.close()
-        for trace in self.traces:
+        for trace in self._read:
             trace.live = self._lives.get(trace.band.device) if trace.entry is not None else None
         self._selected = min(self._selected, max(0, len(bands) - 1))
         self._marks = {}
         self._load()
         self._load_marks()
         self.look()
+
+    def _add_reference(self, trace: BandTrace) -> None:
+        """Give a band its reference; not on a low-bandwidth link, where each dot has its price."""
+        console = trace.console
+        if console is None or trace.reference is not None or self.app.low_bandwidth:
+            return
+        if code := reference_code(console.session.profile, trace.entry):
+            trace.reference = BandTrace(TrendBand(trace.band.device, code), console)
+
+    @property
+    def _read(self) -> list[BandTrace]:
+        """The bands and their references: what is read live and from the record."""
+        references = (trace.reference for trace in self.traces)
+        return [*self.traces, *(item for item in references if item is not None)]
 
     def _console_of(self, device: int) -> DriveConsole | None:
         if device == self.console.device:
@@ -110,11 +136,15 @@ class TrendBands(PanelScreen):
         self.look()
 
     async def _load_page(self) -> None:
-        now, traces = self.app.clock.wall(), list(self.traces)
+        now, traces = self.app.clock.wall(), self._read
         start, until = self.page.begins(now) - READ_BEFORE, self.page.ends(now)
         files = self._files()
         found = await asyncio.to_thread(read_traces, files, traces, start, until)
-        self._recorded = await asyncio.to_thread(recorded_events, files, start, until)
+        devices = frozenset(trace.band.device for trace in traces)
+        self._oldest = await asyncio.to_thread(oldest_reply, files, devices)
+        if self._oldest is not None:
+            past = await asyncio.to_thread(recorded_events, files, self._oldest, until)
+            self._recorded = events_shown(past, devices)
         for trace, history in zip(traces, found, strict=True):
             trace.take(history)
         self._drawn_page = None

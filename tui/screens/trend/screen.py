@@ -112,6 +112,7 @@ class TrendScreen(BandKeys):
             moment=moment,
             events=trend_events(self._recorded, self.app.events.events, devices),
             event=self._event,
+            oldest=self._oldest,
             plain=self.app.plain_signs,
             lean=self.app.low_bandwidth,
             signs=curve_signs(plain=self.app.plain_signs, braille=self.app.has_braille),
@@ -130,7 +131,8 @@ class TrendScreen(BandKeys):
         reading = trace.reading(moment)
         number = reading.current_number if reading is not None and not trace.trouble else None
         points = trace.points
-        trace.scale = scale_for(points, None if turned else trace.scale, number)
+        reference = trace.reference.points if trace.reference is not None else []
+        trace.scale = scale_for([*points, *reference], None if turned else trace.scale, number)
         row = TableRow(
             name=name,
             unit=trace.unit,
@@ -156,6 +158,8 @@ class TrendScreen(BandKeys):
             trouble=trace.trouble,
             note=note,
             row=row,
+            reference=trace.reference.band.code if trace.reference and reference else "",
+            reference_points=reference,
         )
 
     def _room(self) -> TrendRoom:

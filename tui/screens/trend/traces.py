@@ -6,11 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from tui.drive.profile.schema import Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter, Quantity
 from tui.safety import STALE_LEAST
 from tui.session.console import DriveConsole
 from tui.session.monitor.live_trace import LiveTrace
 from tui.session.monitor.snapshot import stale_after
+from tui.session.monitor.trend import readout_parameter
 from tui.session.monitor.trend_bands import TrendBand
 from tui.session.record.columns import HistoryColumn, gaps_of, history_columns, reach_of_points
 from tui.session.record.decoding import NO_GOOD_REPLY, HistoryPoint, curve_unit
@@ -20,6 +22,11 @@ from tui.session.shown import Shown
 MOST_POINTS = 6000
 """Points of a band; more are reduced to COMPACT_COLUMNS."""
 COMPACT_COLUMNS = 2000
+DRAWN_REFERENCES: dict[Quantity, Quantity] = {
+    "output_frequency": "frequency_reference",
+    "speed": "speed_reference",
+}
+"""Quantities that have a reference, which is drawn with them."""
 DRIVE_NOT_OPEN = "drive {} is not open on this line"
 NO_PARAMETER = "the profile has no {}"
 BAND_NOT_READ = "not read: {}"
@@ -40,6 +47,8 @@ class BandTrace:
     """Reasons why values of the record are missing or may differ."""
     scale: tuple[float, float] | None = None
     """Least and greatest value of the axis."""
+    reference: BandTrace | None = None
+    """The reference of the value, in the same unit."""
 
     @property
     def entry(self) -> Parameter | None:
@@ -88,12 +97,23 @@ class BandTrace:
         del self.points[: max(0, before - 1)]
         if len(self.points) > MOST_POINTS:
             self.points = compacted(self.points, start, span)
+        if self.reference is not None:
+            self.reference.add_live(start, span)
 
     def close(self) -> None:
         """Read it no longer."""
         if self.live is not None:
             self.live.close()
             self.live = None
+
+
+def reference_code(profile: Profile, entry: Parameter | None) -> str | None:
+    """Return the code of the reference of a value; None if it has none in its unit."""
+    for quantity, other in DRAWN_REFERENCES.items():
+        found = readout_parameter(profile, quantity), readout_parameter(profile, other)
+        if entry is not None and found[0] is entry and found[1] is not None:
+            return found[1].code if found[1].unit == entry.unit else None
+    return None
 
 
 def compacted(points: Sequence[HistoryPoint], start: float, span: float) -> list[HistoryPoint]:

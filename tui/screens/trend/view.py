@@ -26,12 +26,13 @@ from tui.widgets.palette import (
     FAINT,
     KEY,
     LINE,
+    REFERENCE_STYLE,
     STALE,
     STRONG,
     age_text,
 )
 
-from .axis import tick_columns, trend_axis
+from .axis import kept_line, tick_columns, trend_axis
 from .contents import (
     AXIS_CELLS,
     LATEST_CELLS,
@@ -49,8 +50,26 @@ EVENTS_FROM, EVENTS_CELLS = 110, 31
 """Least width of a terminal with events at the right, and their cells."""
 LEAST_EVENT_ROWS = 3
 """Least rows of the events below the curves, with their heading."""
+KEYS_FROM = 24
+"""Rows at the right from which the keys are listed below the events."""
+TREND_KEYS = (
+    ("Tab", "Tab", "to the events"),
+    ("← →", "Left Rt", "cursor"),
+    ("M", "M", "mark A, then B"),
+    ("< >", "< >", "10 s to 24 h"),
+    ("h", "h", "hold, let run"),
+    ("PgUp Dn", "PgUp Dn", "earlier, later"),
+    ("Home", "Home", "oldest"),
+    ("End", "End", "now"),
+    ("↑ ↓", "Up Down", "band"),
+    ("Enter", "Enter", "choose its value"),
+    ("^s", "^s", "save CSV and SVG"),
+)
+"""Keys, as they are named in ASCII too, and what they do."""
 LEAST_BAND_ROWS = 2
 """Rows of a curve, before anything else is left out."""
+REFERENCE_CELLS = 24
+"""Cells that the name of a reference needs in a heading."""
 NO_BANDS = "No band. Press Enter to choose a parameter."
 
 
@@ -61,23 +80,25 @@ def trend_room(width: int, height: int, bands: int, *, events: bool) -> TrendRoo
     columns = width - AXIS_CELLS - LATEST_CELLS - (EVENTS_CELLS if side else 0)
     heads = bands + 1
     rest = {"table": bands + 1, "clock": 1, "marks": 1, "line": 0 if side else 1}
+    if side:
+        rest["kept"] = 1
     if events and not side:
         least = max(LEAST_EVENT_ROWS, min(bands + 3, height - heads - bands))
         rest = {"events": least, "clock": 1}
-    for part in ("", "line", "marks", "clock", "table"):
+    for part in ("", "kept", "line", "marks", "clock", "table"):
         rest.pop(part, None)
         rows = (height - heads - sum(rest.values())) // bands
         if rows >= LEAST_BAND_ROWS:
             break
     spare = height - heads - sum(rest.values()) - rows * bands
     listed = rest.get("events", 0)
-    for part in ("clock", "marks", "line"):
+    for part in ("clock", "marks", "line", "kept"):
         if spare > 0 and part not in rest and not listed and not (part == "line" and side):
             rest[part] = 1
             spare -= 1
     return TrendRoom(
         columns, max(1, rows), "clock" in rest, "table" in rest, "marks" in rest,
-        bool(rest.get("line")), listed + spare if listed else 0, side,
+        bool(rest.get("line")), "kept" in rest, listed + spare if listed else 0, side,
     )  # fmt: skip
 
 
@@ -91,6 +112,8 @@ def trend_rows(view: TrendView, width: int, height: int) -> list[Text]:
         lines.append(_heading(view, band, number, room))
         lines += _band_rows(view, band, room)
     lines += trend_axis(view, room)
+    if room.kept:
+        lines.append(kept_line(view, AXIS_CELLS + room.columns + LATEST_CELLS))
     if room.side:
         lines = _with_side(view, lines, room)
     if room.table:
@@ -98,15 +121,18 @@ def trend_rows(view: TrendView, width: int, height: int) -> list[Text]:
     if room.marks:
         lines.append(_marks_line(view))
     if room.events:
-        lines += events_lines(view.events, view.event, room.events, width, view.plain)
+        lines += events_lines(view.events, view.event, room.events, width, view.now, view.plain)
     elif room.line:
-        lines.append(event_line(view.events, view.page.cursor, width, view.plain))
+        lines.append(event_line(view.events, view.page.cursor, width, view.now, view.plain))
     return lines[:height]
 
 
 def _with_side(view: TrendView, lines: list[Text], room: TrendRoom) -> list[Text]:
     """Return the lines with the events at their right."""
-    events = events_lines(view.events, view.event, len(lines), EVENTS_CELLS - 2, view.plain)
+    keys = key_lines(view.plain) if len(lines) >= KEYS_FROM else []
+    rows = len(lines) - len(keys)
+    events = events_lines(view.events, view.event, rows, EVENTS_CELLS - 2, view.now, view.plain)
+    events += keys
     width = AXIS_CELLS + room.columns + LATEST_CELLS
     found = []
     for place, line in enumerate(lines):
@@ -116,6 +142,15 @@ def _with_side(view: TrendView, lines: list[Text], room: TrendRoom) -> list[Text
         if place < len(events):
             whole.append_text(events[place])
         found.append(whole)
+    return found
+
+
+def key_lines(plain: bool) -> list[Text]:
+    """Return the list of keys, after an empty line."""
+    found = [Text("")]
+    for drawn, in_ascii, text in TREND_KEYS:
+        line = Text(no_wrap=True).append(f"{in_ascii if plain else drawn:<8}", KEY)
+        found.append(line.append(text, FAINT))
     return found
 
 
@@ -167,10 +202,16 @@ def _labels(low: float, high: float, rows: int) -> tuple[float, ...]:
 def _band_rows(view: TrendView, band: BandView, room: TrendRoom) -> list[Text]:
     low, high = band.scale
     plot = trend_plot(view, room, CurveScale(low, high, _labels(low, high, room.rows)))
-    samples = samples_of_points(band.points, view.page.ends(view.now))
+    end = view.page.ends(view.now)
+    samples = samples_of_points(band.points, end)
+    curves = [Curve(samples, FAINT if band.trouble else STRONG)]
+    if band.reference:
+        reference = [(point.time, point.mean) for point in band.reference_points]
+        held = [sample for sample in reference if sample[0] <= end]
+        curves.append(Curve(held, REFERENCE_STYLE, held=True))
     cursor = None if view.page.cursor is None else plot.column(view.page.cursor)
     drawn = curve_rows(
-        [Curve(samples, FAINT if band.trouble else STRONG)],
+        curves,
         plot,
         band.reach,
         ticks=tuple(column for column, _ in tick_columns(view, room)),
@@ -246,6 +287,9 @@ def _heading(view: TrendView, band: BandView, number: int, room: TrendRoom) -> T
         line.append(f" {short(band.trouble, max(8, rest - 4))}", STALE)
     elif band.note and line.cell_len + len(band.note) + 4 < width - right.cell_len:
         line.append(f" {band.note}", FAINT)
+    if band.reference and line.cell_len + REFERENCE_CELLS < width - right.cell_len:
+        line.append("  ").append_text(Text(view.signs.dots, REFERENCE_STYLE))
+        line.append(f" {band.reference} reference", FAINT)
     line.append(" ")
     begun = line.cell_len - AXIS_CELLS
     cells = [("─", LINE)] * max(0, width - line.cell_len - right.cell_len - 1)
