@@ -17,17 +17,15 @@ from textual.containers import Vertical
 from textual.widgets import OptionList
 
 from tui.drive.plain import plain
+from tui.session.settings.backups import SUFFIX, files_in
 from tui.widgets.drawing import cut
 from tui.widgets.palette import ALARM, FAINT, PLAIN
 from tui.widgets.plain import Plain, entry
 
 from .question import KeyQuestion, hint
 
-FILES_LISTED = 200
-"""Files that are listed at most."""
 NAME_WIDTH, DRIVE_WIDTH, ABOUT_WIDTH = 24, 15, 14
 """Columns of name, drive and comparison; date and time are between name and drive."""
-SUFFIX = ".toml"
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,19 +100,6 @@ class PickFile(KeyQuestion[str | None]):
         at = self.query_one(OptionList).highlighted
         if at is not None:
             self.answer(self._answers[at])
-
-
-def files_in(folders: Iterable[Path]) -> list[Path]:
-    """The files of these folders with the right ending, newest first; none is read."""
-    found: dict[Path, float] = {}
-    for folder in folders:
-        try:
-            for path in folder.iterdir():
-                if path.suffix == SUFFIX and path.is_file():
-                    found[path] = path.stat().st_mtime
-        except OSError:
-            continue
-    return sorted(found, key=lambda path: -found[path])[:FILES_LISTED]
 
 
 def file_line(path: Path, about: FileAbout) -> Text:

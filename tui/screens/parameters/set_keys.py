@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, ClassVar
 
@@ -23,6 +22,7 @@ from tui.drive.settings.restore_plan import RestoreItem
 from tui.drive.settings.selection import Choice
 from tui.drive.settings.set_file import read_set
 from tui.drive.settings.writable import is_setting
+from tui.session.settings.backups import newest_backup
 from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
 
@@ -33,7 +33,6 @@ from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
-    from tui.session.drive import DriveSession
 
 SKIPPED_KEYS = hint(("Enter or Esc", "Close"), ("Up, Down", "Scroll"))
 
@@ -102,24 +101,6 @@ def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbou
 NO_BACKUP = "No backup of this drive on this line in this folder or in the backup folder."
 SAVED_ALL = "Saved: {count} parameters, in {path}"
 SAVED_SOME = "Saved: {count} parameters, without {absent} that the drive does not report, in {path}"
-
-
-def newest_backup(session: DriveSession) -> Path | None:
-    """Return the newest parameter set of a drive in the folders of backups; reads their files.
-
-    The file names the family, the line and the address, so it is not one of another machine.
-    """
-    from tui.session.paths import state_folder
-
-    from ..dialogs.pick_file import files_in
-
-    wanted = (session.profile.id, session.line_text, session.device)
-    for path in files_in([Path.cwd(), state_folder()]):
-        with suppress(DriveError):
-            head = read_set(path, path.name).head
-            if (head.profile, head.line, head.device) == wanted:
-                return path
-    return None
 
 
 class SetKeys(ParameterKeys):
