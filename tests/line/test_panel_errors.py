@@ -29,6 +29,7 @@ SCREENS = {
     "Control": ("6", "tui.screens.control.screen:ControlSourceScreen.draw"),
     "Frames": ("7", "tui.screens.frames.screen:FramesScreen.draw"),
     "Messages": ("m", "tui.screens.messages.screen:MessagesScreen.draw"),
+    "Start-up": ("B", "tui.screens.startup.screen:StartUpScreen.draw"),
     "Wiring": ("I", "tui.screens.wiring.screen:WiringScreen.draw_frame"),
 }
 DIALOGS = {

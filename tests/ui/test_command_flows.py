@@ -35,6 +35,7 @@ from tui.screens.keys.help import HelpScreen
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.edit_value import PickValue
+from tui.screens.startup.screen import StartUpScreen
 from tui.screens.wiring.screen import WiringScreen
 from tui.session.command.stop_report import Phase, StopReport
 from tui.session.connect.open_line import OpenLine, open_line
@@ -394,6 +395,7 @@ SCREENS = {
     "frames": ("7", FramesScreen),
     "messages": ("m", MessagesScreen),
     "wiring": ("I", WiringScreen),
+    "start-up": ("B", StartUpScreen),
     "run line": ("v", MonitorScreen),
     "coast": ("z", Confirm),
     "leave": ("q", Leave),

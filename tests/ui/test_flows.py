@@ -33,6 +33,7 @@ from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.opening import OpeningScreen
 from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.startup.screen import StartUpScreen
 from tui.screens.trend.screen import TrendScreen
 from tui.screens.wiring.screen import WiringScreen
 from tui.session.connect.open_line import OpenLine, demo_line
@@ -246,6 +247,7 @@ def test_every_action_has_a_method_and_a_text() -> None:
         BlocksScreen,
         MessagesScreen,
         WiringScreen,
+        StartUpScreen,
         ListeningScreen,
         TrendScreen,
     )

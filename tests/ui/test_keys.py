@@ -165,7 +165,7 @@ async def test_digits_of_a_french_keyboard_open_screens_and_are_typed_in_numbers
 
 
 KEY_OF = {tab.name: tab.digit for tab in TABBED}
-OVER = {"messages": "m", "wiring": "I"}
+OVER = {"messages": "m", "wiring": "I", "start-up": "B"}
 """Screens that are none of the seven places, and their keys."""
 
 
@@ -294,7 +294,7 @@ async def stage(made: Bench) -> None:
     await until(made.pilot, lambda: "staged. Press" in shown(made.app, "detail"))
 
 
-SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "wiring"}
+SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "start-up", "wiring"}
 """Screens with fewer letters that write than those that are kept: looked at by the sweeps."""
 
 
@@ -361,7 +361,7 @@ async def back_to(made: Bench, screen: str) -> None:
 
 REPLAY_KEYS = {*"0;{}$#@", "comma"}
 SHOW_EVERYWHERE = {
-    *"12345678", *"&é\"'(è_", "/", "m", "I", "ctrl+p", "?", "f1", "ctrl+l", *REPLAY_KEYS
+    *"12345678", *"&é\"'(è_", "/", "m", "I", "B", "ctrl+p", "?", "f1", "ctrl+l", *REPLAY_KEYS
 }  # fmt: skip
 ARROWS = {"up", "down", "pageup", "pagedown"}
 SHOW = {
@@ -379,6 +379,7 @@ SHOW = {
     "listening": {*ARROWS, "tab"},
     "trend": {*ARROWS, "left", "right", "<", ">", "M", "tab", "home", "end"},
     "messages": ARROWS,
+    "start-up": {"up", "down", "tab", "shift+tab"},
     "wiring": {*ARROWS, "tab", "shift+tab"},
 }  # fmt: skip
 

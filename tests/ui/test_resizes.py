@@ -20,7 +20,8 @@ AWKWARD = [(22, 60), (20, 40), (22, 100), (5, 3), (59, 100), (300, 15), (60, 16)
 """Sizes that ended the panel, and the edges."""
 SCREENS = {
     "Line": "1", "Monitor": "2", "Parameters": "3", "Scanner": "4", "Faults": "5", "Control": "6",
-    "Frames": "7", "Messages": "m", "Wiring": "I", "run line": "f", "search": "slash",
+    "Frames": "7", "Messages": "m", "Wiring": "I", "Start-up": "B", "run line": "f",
+    "search": "slash",
 }  # fmt: skip
 """Keys that lead from Monitor to each screen."""
 

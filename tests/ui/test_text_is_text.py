@@ -41,6 +41,7 @@ from .fakes import press
 from .test_command_flows import Bench, bench
 from .test_flows import shown, until
 from .test_parameter_flows import open_file, write
+from .test_start_up_screen import start_up as open_start_up
 
 pytestmark = pytest.mark.drawn
 
@@ -206,6 +207,18 @@ async def connection(made: Bench) -> None:
     await made.pilot.press("escape")
 
 
+async def start_up(made: Bench) -> None:
+    opened = await open_start_up(made, "Identity")
+    await made.pilot.press("enter")
+    for text in MARKUP:
+        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+        made.app.screen.query_one(Input).value = text
+        await made.pilot.pause()
+    await made.pilot.pause(0.4)
+    await made.pilot.press("enter")
+    await until(made.pilot, lambda: bool(opened.record.entries))
+
+
 WAYS: dict[str, tuple[str, Way]] = {
     "monitor": ("atv71", monitor),
     "rating": ("atv21", rating),
@@ -215,6 +228,7 @@ WAYS: dict[str, tuple[str, Way]] = {
     "scanner": ("atv71", blocks),
     "faults": ("atv71", faults),
     "line": ("atv71", connection),
+    "start-up": ("atv71", start_up),
 }
 QUESTION_CLASSES = {
     "rating",
@@ -231,6 +245,7 @@ QUESTION_CLASSES = {
     "@ of a replay",  # in test_replay
     "n",
     "bundle of the palette",
+    "reference of Start-up",
 }
 
 

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .counters.watch import CounterWatch
     from .diagnosis.diagnosis import Diagnosis
     from .settings.editor import Editor
+    from .startup.start_up import StartUp
 
 
 @dataclass(eq=False)
@@ -40,6 +41,8 @@ class DriveConsole:
     """The last diagnosis of missing or bad replies; None before the first."""
     diagnosed_at: float = 0.0
     """Wall time of that diagnosis."""
+    start_up: StartUp | None = None
+    """The guided start-up of this drive; None until a screen has opened it."""
 
     def __post_init__(self) -> None:
         self.monitor = Monitor(self.session)
@@ -71,7 +74,7 @@ class DriveConsole:
         """Staged and written values of its parameters."""
         from .settings.editor import Editor  # what Monitor does not need is imported later
 
-        return Editor(self.session, self.journal, self._state)
+        return Editor(self.session, self.journal, lambda: self.current_state)
 
     @cached_property
     def blocks(self) -> BlockEditor:
@@ -102,7 +105,9 @@ class DriveConsole:
         """The last cycle of the monitor."""
         return self.monitor.latest
 
-    def _state(self) -> DriveState | None:
+    @property
+    def current_state(self) -> DriveState | None:
+        """State of the drive in the last cycle; None if that failed or is old."""
         latest = self.monitor.latest
         if latest is None or latest.error or latest.is_stale(self.session.clock.monotonic()):
             return None

@@ -28,11 +28,15 @@ CHANNEL_QUANTITIES: tuple[Quantity, ...] = ("command_channel", "reference_channe
 
 
 def report_text(
-    profile: Profile, values: ParameterSet, entries: Sequence[Entry], trends: Sequence[str] = ()
+    profile: Profile,
+    values: ParameterSet,
+    entries: Sequence[Entry],
+    trends: Sequence[str] = (),
+    start_up: Sequence[str] = (),
 ) -> str:
     """Return the report as Markdown; `entries` are the drive's journal entries, oldest first.
 
-    `trends` are lines about its last trip and run.
+    `trends` are lines about its last trip and run, `start_up` those about its start-up.
     """
     maker = ReportParts.from_entries(profile, values, entries)
     parts = (
@@ -45,6 +49,7 @@ def report_text(
         maker.faults(),
         maker.seen(),
         *([trends] if trends else []),
+        *([start_up] if start_up else []),
         maker.journal(),
     )
     return plain("\n".join(line for part in parts for line in (*part, "")), lines=True)

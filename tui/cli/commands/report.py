@@ -73,6 +73,7 @@ def report(
     from tui.session.journal_reading import entries_of
     from tui.session.report import report_text as text_of
     from tui.session.report_trends import TREND_KINDS, report_trends, trend_file
+    from tui.session.startup.lines import start_up_lines
 
     from ..documents.setting_documents import ReportDocument
     from ..shared.output import drive_fields, print_json
@@ -100,7 +101,8 @@ def report(
     record = record_files(target.line_text)
     trends = report_trends(record, target.device, session.profile, entries, time.time())
     lines = _written_trends(trends, file, force=force)
-    write_down(file, text_of(session.profile, values, entries, lines), force=force)
+    text = text_of(session.profile, values, entries, lines, start_up_lines(session))
+    write_down(file, text, force=force)
     messages = Messages(as_json=as_json or file == STANDARD)
     messages.tell(f"{file}: report on {session.profile.name} at address {target.device}")
     if as_json:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
 BLOCKS, MESSAGES, WIRING = "scanner", "messages", "wiring"
+START_UP = "start-up"
 OPENING = "opening"
 """Monitor before its drive is known."""
 MAP = "map"

@@ -19,7 +19,7 @@ from .table import APP_ACTIONS, STOP_ACTIONS
 EVERY_SCREEN = "every screen"
 """Heading of the app's own actions in a page."""
 INDEX = re.compile(r"(<!-- screens -->\n).*?(<!-- end of screens -->)", re.DOTALL)
-TABLE = re.compile(r"(<!-- keys of (?P<of>[a-z ]+) -->\n).*?(<!-- end of keys -->)", re.DOTALL)
+TABLE = re.compile(r"(<!-- keys of (?P<of>[a-z -]+) -->\n).*?(<!-- end of keys -->)", re.DOTALL)
 
 
 def with_tables(text: str) -> str:

@@ -17,6 +17,7 @@ PACKAGES = (
     "frames",
     "trend",
     "messages",
+    "startup",
     "wiring",
 )
 """Packages of tui.screens, in the order in which their screens are listed."""

@@ -14,7 +14,7 @@ from tui.terminal.names import UNSHIFTED_DIGITS
 from tui.widgets.drawing import KeyLabel, fitting
 from tui.widgets.replay_bar import NO_MOTOR
 
-from .action import Action
+from .action import START_UP, Action
 from .screens import EVERYWHERE, SCREENS, TABBED
 
 app_action = partial(Action, screens=EVERYWHERE, app=True)
@@ -55,6 +55,7 @@ REPORT_DRIVE = "Report on the open drive: read everything and write a file (Mark
 TYPE_ADDRESS = "Type the address of a drive on this line; Enter opens it."
 FIND = "Find a parameter by code, name, address or value; works on every screen."
 WIRING_HELP = "Show wiring and warnings of the family: pins, line rules, LEDs, commands, errata."
+GUIDE = "Start up the open drive step by step: steps from a file, results on disk."
 WHY = "Diagnose why a silent drive gives no answer; show the next steps."
 HEAR = "Listen to a line with another master; send nothing. Asks first."
 ACCEPT = "Accept the changed line: another adapter, or other drives. Asks first."
@@ -85,6 +86,7 @@ APP_ACTIONS: tuple[Action, ...] = (
     app_action("find", "/", "", FIND),
     app_action("messages", "m", "", "Show all messages, with their times."),
     app_action("wiring", "I", "", WIRING_HELP),
+    app_action(f"goto({START_UP!r})", "B", "", GUIDE),
     app_action("why", "N", "", WHY),
     app_action("hear", "H", "", HEAR),
     app_action("replay_hold", "0", "", "In a replay: hold it, or let it go on."),

@@ -144,8 +144,9 @@ class SetKeys(ParameterKeys):
         from tui.session.page_forms import PAGE_SUFFIXES, page_text
         from tui.session.report import report_text
         from tui.session.report_trends import linked, report_trend_lines, report_trends, trend_files
+        from tui.session.startup.lines import start_up_lines
 
-        profile, device = self.session.profile, self.session.device
+        session, profile, device = self.session, self.session.profile, self.session.device
         recorder = self.app.opened.recorder if self.app.opened is not None else None
         now = self.app.clock.wall()
 
@@ -158,7 +159,8 @@ class SetKeys(ParameterKeys):
             drawn = trend_files(trends, path.stem)
             for name, svg in drawn.values():
                 write_file(path.with_name(name), svg)
-            return report_text(profile, values, entries, report_trend_lines(trends, linked(drawn)))
+            lines = report_trend_lines(trends, linked(drawn))
+            return report_text(profile, values, entries, lines, start_up_lines(session))
 
         about = (
             "Identity, line, changed settings, control source, communication loss reaction, faults,"

@@ -1,0 +1,162 @@
+"""Start-up on the panel: it records, leads to where things are done, and moves no motor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from textual.screen import ModalScreen
+
+from tui.screens.dialogs.ask import Ask
+from tui.screens.parameters.edit_value import EditNumber, PickValue
+from tui.screens.startup.screen import StartUpScreen
+from tui.session.startup.start_up import StartUp
+
+from .test_command_flows import Bench, bench, writes
+from .test_flows import shown, until
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+    monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path))
+
+
+async def start_up(made: Bench, step: str = "") -> StartUp:
+    """Open Start-up, at a step if one is named, with its values read."""
+    app = made.app
+    while isinstance(app.screen, ModalScreen):
+        await made.pilot.press("escape")
+    if app.place != "start-up":
+        await made.pilot.press("B")
+        await until(made.pilot, lambda: app.place == "start-up")
+    await until(made.pilot, lambda: app.chosen is not None and app.chosen.start_up is not None)
+    assert app.chosen is not None
+    opened = app.chosen.start_up
+    assert opened is not None
+    if step:
+        opened.go([s.step for s in opened.guide.steps].index(step) - opened.index)
+        opened.row = 0
+        assert isinstance(app.screen, StartUpScreen)
+        app.screen.read_again()
+        screen = app.screen
+        await until(made.pilot, lambda: set(opened.step.codes) <= set(screen.readings))
+        screen.look()
+    return opened
+
+
+def has_turned(made: Bench) -> bool:
+    """True if the trend shows a motor that turns."""
+    point = made.app.chosen.monitor.last_point if made.app.chosen is not None else None
+    return point is not None and (point.values[0] or 0.0) > 1.0
+
+
+async def row(made: Bench, opened: StartUp, kind: str) -> None:
+    """Put the cursor on the first row of a kind."""
+    opened.row = [str(found.kind) for found in opened.rows].index(kind)
+
+
+async def test_number_of_the_nameplate_is_proposed_and_only_staged() -> None:
+    async with bench("atv71") as made:
+        opened = await start_up(made, "Nameplate")
+        assert "drive" not in shown(made.app, "steps").split("UNS on the")[1].split("\n")[0]
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+        await made.pilot.pause(0.4)
+        await made.pilot.press(*"400", "enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+        await until(
+            made.pilot, lambda: "→ 400 V" in str(made.app.screen.query_one("#held").render())
+        )
+        await made.pilot.pause(0.4)
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: "1 staged" in shown(made.app, "said"))
+        opened = await start_up(made, "Nameplate")
+        await until(made.pilot, lambda: "400  drive 230 V  differs" in shown(made.app, "steps"))
+        assert opened.record.entries == {"UNS": "400"}
+        await row(made, opened, "done")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: "Not done" in shown(made.app, "said"))
+        assert writes(made.app) == []
+
+
+@pytest.mark.sweep
+async def test_wrong_direction_proposes_its_parameter_and_stays_open() -> None:
+    async with bench("atv71") as made:
+        opened = await start_up(made, "Direction")
+        await row(made, opened, "turned")
+        await made.pilot.press("enter")  # before any run
+        await until(made.pilot, lambda: "no run was seen" in shown(made.app, "said"))
+        await row(made, opened, "run")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: made.app.place == "monitor")
+        await until(made.pilot, lambda: "press a to arm, r, type 5" in shown(made.app, "said"))
+        assert writes(made.app) == []
+        await made.running()
+        await until(made.pilot, lambda: has_turned(made))
+        opened = await start_up(made, "Direction")
+        await row(made, opened, "run")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: "Run" in opened.record.entries)
+        opened.row = [found.key for found in opened.rows].index("the other way")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, PickValue))
+        await made.pilot.press("space")
+        await until(made.pilot, lambda: made.speed() == 0)
+        assert not isinstance(made.app.screen, PickValue)  # a stop cancels the proposal
+        assert made.drive().raw("PHR") == 0
+        opened = await start_up(made, "Direction")
+        assert opened.record.state == "deficient"
+        await row(made, opened, "run")
+        await made.pilot.press("enter")  # the run before the deficiency does not count
+        await until(made.pilot, lambda: made.app.place == "monitor")
+
+
+@pytest.mark.sweep
+async def test_stop_ends_a_typed_answer_of_the_start_up() -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        opened = await start_up(made, "Insulation")
+        await row(made, opened, "skip")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+        await made.pilot.press("n", "o", "f12")
+        await until(made.pilot, lambda: made.speed() == 0)
+        assert made.app.place == "start-up"
+        assert not isinstance(made.app.screen, Ask)
+        assert opened.record.state == "open"
+
+
+@pytest.mark.sweep
+async def test_changed_settings_are_named_after_a_lost_line() -> None:
+    async with bench("atv71") as made:
+        opened = await start_up(made, "Ramps")
+        await until(made.pilot, lambda: not opened.changes.needs_all)
+        opened.changes.lost()
+        made.drive().set("ACC", 55)
+        await until(made.pilot, lambda: "ACC 3.0 s → 5.5 s" in shown(made.app, "steps"))
+        assert opened.step.step == "Ramps"
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("family", ["atv21", "atv312", "atv71", "powerdrive"])
+async def test_no_row_of_any_step_writes_or_moves_a_motor(family: str) -> None:
+    """Armed; each row gets Enter twice, then y and the digit of a typed answer."""
+    async with bench(family) as made:
+        await made.armed()
+        opened = await start_up(made)
+        for step in opened.guide.steps:
+            for number in range(len(opened.rows) + 3):
+                if not made.is_armed():
+                    await made.pilot.press("2")
+                    await made.armed()
+                opened = await start_up(made, step.step)
+                if number >= len(opened.rows):
+                    break
+                opened.row = number
+                await made.pilot.press("enter")
+                await made.pilot.pause(0.05)
+                await made.pilot.press("enter")
+                await made.pilot.press("r", "enter")  # as on Monitor, all in one
+                assert writes(made.app) == [], (step.step, number)
+                assert made.speed() == 0

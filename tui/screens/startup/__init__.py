@@ -1,0 +1,1 @@
+"""Start-up: the steps of a commissioning, one by one, with their results."""

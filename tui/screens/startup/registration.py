@@ -1,0 +1,45 @@
+"""Registration of Start-up: what the panel lists, and the keys."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from ..keys.action import Registration, key_rows
+
+if TYPE_CHECKING:
+    from textual.screen import Screen
+
+    from tui.session.console import DriveConsole
+
+
+def create_start_up(console: DriveConsole) -> Screen[None]:
+    """Create the screen on a drive."""
+    from .screen import StartUpScreen
+
+    return StartUpScreen(console)
+
+
+def no_start_up(console: DriveConsole) -> str:
+    """Return why a drive has no start-up; empty if it can have one."""
+    from tui.session.connect.line_key import is_replay
+
+    return "A replay has no start-up." if is_replay(console.session.line_text) else ""
+
+
+REGISTERED = (
+    Registration(
+        title="Start-up",
+        about="the steps of a commissioning, with their results",
+        key="B",
+        create=create_start_up,
+        refusal=no_start_up,
+        actions=key_rows(
+            ("open", "enter", "open", "Do what the row says: record, or go where it is done."),
+            ("move(-1)", "up", "", "Go to the previous row."),
+            ("move(1)", "down", "", "Go to the next row."),
+            ("section(1)", "tab", "next", "Go to the next step."),
+            ("section(-1)", "shift+tab", "", "Go to the previous step."),
+            ("leave", "escape", "back", "Go back."),
+        ),
+    ),
+)

@@ -1,0 +1,292 @@
+"""Start-up as lines: the steps at the left, the present one at the right; pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.drive.plain import plain
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.writable import is_setting
+from tui.session.shown import Shown
+from tui.session.startup.judging import TURNED, StepRow, changed_codes
+from tui.session.startup.start_up import StartUp
+from tui.session.startup.steps import KIND_ACCESS, GuideStep
+from tui.widgets.drawing import cut, cut_at_word, rule, wrapped
+from tui.widgets.palette import (
+    ALARM,
+    ATTENTION,
+    CURSOR,
+    FAINT,
+    FAULT,
+    LINE,
+    PLAIN,
+    STALE,
+    STRONG,
+    age_text,
+)
+
+STEP_SIGNS: Mapping[str, tuple[str, Style]] = {
+    "done": ("●", PLAIN),
+    "skipped": ("–", FAINT),
+    "deficient": ("■", FAULT),
+    "open": ("○", FAINT),
+    "changed": ("◆", ALARM),
+}
+"""Sign of a step by its state; `changed` if a setting changed after it was done."""
+STEPS_WIDTH, RESULT_WIDTH = 23, 18
+"""Columns of the steps; columns of each one's result on a wide screen."""
+RESULTS_FROM = 110
+LABEL_WIDTH = 26
+RESULT_LABELS = {
+    "done": "Done: go to the next step",
+    "deficient": "Deficiency ...",
+    "skip": "Skip with a reason ...",
+}
+ACTION_LABELS = {
+    "run": "Run the motor",
+    "test": "Test the timeout",
+    "save": "Save to EEPROM",
+    "backup": "Back up",
+    "report": "Write the report",
+}
+
+
+class StartUpView(NamedTuple):
+    """The contents of the screen."""
+
+    start_up: StartUp
+    profile: Profile
+    readings: Mapping[str, Shown]
+    raws: Mapping[str, int]
+    """Current values only."""
+    staged: Mapping[str, str]
+    now: float
+    identity: str
+    """Reference and model that the drive reports."""
+    differs: Callable[[StepRow, str], bool]
+    """Returns True if an entry of a nameplate differs from the drive."""
+
+
+def title_line(view: StartUpView, width: int) -> Text:
+    """Return the heading: the present step and the counts."""
+    start_up = view.start_up
+    counts = start_up.counts()
+    place = f"step {start_up.index + 1} of {len(start_up.guide.steps)}"
+    done = ", ".join(f"{n} {state}" for state, n in counts.items() if n)
+    return rule(f"{plain(start_up.guide.title)}: {place}", width, done)
+
+
+def walk_lines(view: StartUpView, width: int, height: int) -> list[Text]:
+    """Return all lines, exactly `height` of them."""
+    left_width = STEPS_WIDTH + (RESULT_WIDTH if width >= RESULTS_FROM else 0)
+    foot = foot_lines(view, width)
+    rows = height - len(foot)
+    left = _steps(view, left_width, rows)
+    right = _step(view, width - left_width - 3, rows)
+    lines = []
+    for at in range(rows):
+        line = left[at] if at < len(left) else Text(" " * left_width)
+        line.append(" │ ", LINE)
+        lines.append(line.append_text(right[at]) if at < len(right) else line)
+    return [*lines, *foot]
+
+
+def _changed(view: StartUpView, step: GuideStep) -> list[str]:
+    """Return the settings of a done step that differ from those at that time."""
+    return changed_codes(step, view.start_up.progress.record(step.step), view.raws)
+
+
+def _state(view: StartUpView, step: GuideStep) -> str:
+    record = view.start_up.progress.record(step.step)
+    return "changed" if _changed(view, step) else record.state
+
+
+def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
+    """Return the steps around the present one."""
+    start_up = view.start_up
+    steps, at = start_up.guide.steps, start_up.index
+    top = max(0, min(at - rows // 2, len(steps) - rows))
+    lines = []
+    for number, step in enumerate(steps[top : top + rows], start=top + 1):
+        state = _state(view, step)
+        sign, style = STEP_SIGNS[state]
+        here = number == at + 1
+        text = Text(" ▸" if here else "  ", ATTENTION, no_wrap=True)
+        text.append(sign, style)
+        name = cut(plain(step.step), STEPS_WIDTH - 6)
+        text.append(f"{number:>2} {name}", STRONG if here else PLAIN)
+        if width > STEPS_WIDTH:
+            text.append(f" {cut(_result(view, step), RESULT_WIDTH - 1)}", FAINT)
+        lines.append(text)
+    return lines
+
+
+def _result(view: StartUpView, step: GuideStep) -> str:
+    """Return the result of a step in a few words."""
+    record = view.start_up.progress.record(step.step)
+    if changed := _changed(view, step):
+        return f"{', '.join(changed)} changed"
+    return plain(record.text or next(iter(record.entries.values()), ""))
+
+
+def _step(view: StartUpView, width: int, rows: int) -> list[Text]:
+    """Return the present step: access, task, its rows, note and source."""
+    start_up = view.start_up
+    step, record = start_up.step, start_up.record
+    sign, style = STEP_SIGNS[_state(view, step)]
+    head = Text(f"{sign} ", style, no_wrap=True)
+    head.append(f"{start_up.index + 1} {plain(step.step)}", STRONG)
+    top = [head, *(Text(line, style) for line in wrapped(state_text(view), width, 2))]
+    for label, text in access(view.profile, step):
+        top += _wrapped(label, text, width, 2)
+    top += [Text(line, PLAIN) for line in wrapped(plain(step.text), width, 3)]
+    note = [Text(line, FAINT) for line in wrapped(plain(step.note), width, 6)]
+    source = f"Source: {step_source(view.profile, step)}"
+    below = [*note, *(Text(line, FAINT) for line in wrapped(plain(source), width, 2))]
+    if record.past:
+        below.append(Text(cut_at_word(f"Before: {plain(record.past[-1])}", width), FAINT))
+    body = [_row(view, row, width, number == start_up.row) for number, row in _numbered(view)]
+    # the rows are never cut off: first the note goes, then the rows scroll with the cursor
+    room = max(3, rows - len(top))
+    if len(body) > room:
+        first = max(0, min(start_up.row - room // 2, len(body) - room))
+        body = body[first : first + room]
+    return [*top, *body, *below][:rows]
+
+
+def _numbered(view: StartUpView) -> list[tuple[int, StepRow]]:
+    return list(enumerate(view.start_up.rows))
+
+
+def state_text(view: StartUpView) -> str:
+    """Return the state of the present step in words."""
+    start_up = view.start_up
+    record = start_up.record
+    when = f" {record.time[11:16]}" if record.time else ""
+    changed = ", ".join(_changed(view, start_up.step))
+    texts = {
+        "done": f"done{when}; since then changed: {changed}" if changed else f"done{when}",
+        "skipped": f"skipped{when}: {record.text}",
+        "deficient": f"DEFICIENT{when}: {record.text}",
+        "open": "",
+    }
+    return plain(texts[record.state])
+
+
+def access(profile: Profile, step: GuideStep) -> list[tuple[str, str]]:
+    """Return what a step reads and what it writes, with labels."""
+    reads, writes = KIND_ACCESS[step.kind]
+    codes = step.codes
+    read = ", ".join(part for part in (reads, " ".join(codes)) if part) or "nothing"
+    settings = [c for c in codes if is_setting(profile, profile[c]) and c != step.rated]
+    if step.kind == "settings":
+        writes = f"{writes}: {' '.join(settings)}" if settings else "nothing"
+    elif settings:
+        writes = f"{writes}; what you stage: {' '.join(settings)}"
+    return [("Reads", read), ("Writes", writes)]
+
+
+def step_source(profile: Profile, step: GuideStep) -> str:
+    """Return the source of a step; the id of a manual of the profile as its title."""
+    titles = {source.id: source.title for source in profile.data.sources}
+    first, _, rest = step.source.partition(" ")
+    named = f"{titles[first]}, {rest}" if first in titles else step.source
+    return f"{named.rstrip(', ')} ({step.confidence})"
+
+
+def _wrapped(label: str, text: str, width: int, most: int) -> list[Text]:
+    lines = []
+    for at, part in enumerate(wrapped(plain(text), width - 7, most)):
+        line = Text(f"{label if not at else '':<7}", FAINT, no_wrap=True)
+        lines.append(line.append(part, PLAIN))
+    return lines
+
+
+def _row(view: StartUpView, row: StepRow, width: int, chosen: bool) -> Text:
+    """Return one row: its sign, its name, its value."""
+    record = view.start_up.record
+    text = Text("▸ " if chosen else "  ", ATTENTION, no_wrap=True)
+    if row.kind in RESULT_LABELS:
+        text.append(RESULT_LABELS[row.kind], PLAIN)
+    elif row.kind == "turned":
+        mark = "●" if record.entries.get(TURNED) == row.key else "○"
+        text.append(f"{mark} The motor turned: {row.key}", PLAIN)
+    elif row.kind == "parameter":
+        text.append_text(_parameter(view, row.key, width))
+    else:
+        entry = record.entries.get(row.key, "")
+        text.append(cut(_label(view, row), LABEL_WIDTH), PLAIN)
+        if row.kind in ("save", "report"):
+            pass
+        elif entry:
+            text.append(f" {plain(entry)}", STRONG)
+            if row.field is not None and row.field.unit:
+                text.append(f" {row.field.unit}", FAINT)
+            if row.kind == "plate":  # before there is an entry, a person would copy it
+                text.append("  drive ", FAINT).append_text(_value(view, row.key))
+            elif row.kind == "reference":
+                text.append(f"  drive {view.identity or 'does not report it'}", FAINT)
+            if view.differs(row, entry):
+                text.append("  differs", ALARM)
+        else:
+            text.append(" optional" if not row.required else " .....", FAINT)
+    if chosen:
+        text.append(" " * max(0, width - text.cell_len))
+        text.stylize(CURSOR)
+    return text
+
+
+def _label(view: StartUpView, row: StepRow) -> str:
+    if row.kind == "plate":
+        return f"{row.key} on the nameplate"
+    if row.kind == "speed":
+        return f"At {row.key}"
+    if row.kind == "stop":
+        return f"Stopped by {row.key}"
+    return plain(ACTION_LABELS.get(row.kind, row.key))
+
+
+def _parameter(view: StartUpView, code: str, width: int) -> Text:
+    name = view.profile[code].name
+    text = Text(f"{code:<6}", STRONG).append(f" {cut(name, LABEL_WIDTH - 7)} ", PLAIN)
+    text.append_text(_value(view, code))
+    if code in view.staged:
+        text.append(f"  staged {view.staged[code]}", ATTENTION)
+    return text
+
+
+def _value(view: StartUpView, code: str) -> Text:
+    reading = view.readings.get(code)
+    none = Text("-----", FAINT)
+    if reading is None:
+        return none
+    if reading.absent:
+        return Text("not in this drive", FAINT)
+    return reading.drawn(
+        view.now,
+        current=lambda value: Text(value.display, STRONG),
+        old=lambda value, age: Text(f"{value.display}, {age_text(age)} old", STALE),
+        missing=none,
+    )
+
+
+def foot_lines(view: StartUpView, width: int) -> list[Text]:
+    """Return what is not of one step: trouble with the disk, and what has changed."""
+    start_up = view.start_up
+    lines = []
+    if start_up.trouble:
+        lines.append(Text(f" {plain(start_up.trouble)}", FAULT))
+    if start_up.notice:
+        lines.append(Text(f" {plain(start_up.notice)}", ALARM))
+    if start_up.changes.texts:
+        count = len(start_up.changes.texts)
+        text = f" Changed while nothing was read, {count}: {', '.join(start_up.changes.texts)}"
+        lines.append(Text(cut_at_word(text, width).rstrip(), ALARM))
+    elif start_up.resumed:
+        begun = start_up.progress.begun[:16].replace("T", " ")
+        lines.append(Text(f" Begun {begun}. Leave at any step; B continues there.", FAINT))
+    return [rule("", width), *lines] if lines else []

@@ -1,0 +1,1 @@
+"""Guided start-up of a drive: steps from a file, their results on disk."""

@@ -1,0 +1,103 @@
+"""Results of a start-up on disk: one file per drive, complete or unchanged, nothing forgotten."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from contextlib import suppress
+from pathlib import Path
+from typing import Literal
+
+import msgspec
+
+from ..connect.line_key import line_key
+from ..drive import DriveSession
+from ..paths import state_folder
+from ..stored import store_json, stored_json
+
+PROGRESS_FOLDER = "startup"
+StepState = Literal["open", "done", "skipped", "deficient"]
+
+
+class StepRecord(msgspec.Struct, kw_only=True):
+    """Result of one step."""
+
+    state: StepState = "open"
+    text: str = ""
+    """Reason of a skip, or the deficiency."""
+    by: str = ""
+    """Login name of the user of the panel."""
+    time: str = ""
+    """Local time with its zone of the last change."""
+    entries: dict[str, str] = {}
+    """Typed or measured, by row."""
+    raws: dict[str, int] = {}
+    """Settings of the step, by code, at the time it was done."""
+    past: list[str] = []
+    """Former results, oldest first: each deficiency stays here."""
+
+
+class StartUpProgress(msgspec.Struct, kw_only=True):
+    """Progress of one drive."""
+
+    begun: str
+    """Local time with its zone."""
+    drive: str
+    guide: str = ""
+    """File of the steps that a person opened; empty for the file of the family."""
+    at: str = ""
+    """Name of the present step."""
+    seen: dict[str, int] = {}
+    """Settings of all steps as they were last read, by code."""
+    saved: str = ""
+    steps: dict[str, StepRecord] = {}
+
+    def record(self, step: str) -> StepRecord:
+        """Return the result of a step; an open one if it has none."""
+        return self.steps.get(step) or StepRecord()
+
+
+def progress_file(session: DriveSession) -> Path:
+    """Return the file of a drive: by line, address, family and reported identity."""
+    identity = session.known_identity
+    line = line_key(session.line_text)
+    parts = (line, str(session.device), session.profile.id, identity.reference, identity.name)
+    digest = hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:12]
+    name = re.sub(r"[^A-Za-z0-9]+", "-", identity.reference or session.profile.id).strip("-")
+    return state_folder() / PROGRESS_FOLDER / f"{session.device}-{name[:40]}-{digest}.json"
+
+
+def read_progress(file: Path) -> StartUpProgress | None:
+    """Return the progress in a file; None if there is none or it is damaged."""
+    stored = stored_json(file)
+    if stored is None:
+        return None
+    try:
+        return msgspec.convert(stored, StartUpProgress)
+    except msgspec.ValidationError:
+        return None
+
+
+def set_damaged_aside(file: Path) -> Path | None:
+    """Rename a file that cannot be used, so that it is not overwritten; None if there is none.
+
+    Raises OSError.
+    """
+    if not file.exists():
+        return None
+    aside = file.with_suffix(".damaged")
+    for number in range(2, 100):
+        if not aside.exists():
+            break
+        aside = file.with_suffix(f".damaged{number}")
+    return file.rename(aside)
+
+
+def save_progress(file: Path, progress: StartUpProgress) -> None:
+    """Write the progress; keep newer results of another program. Raises OSError."""
+    with suppress(OSError):
+        if (other := read_progress(file)) is not None and other.begun == progress.begun:
+            for name, theirs in other.steps.items():
+                if theirs.time > progress.record(name).time:
+                    progress.steps[name] = theirs
+    store_json(file, msgspec.to_builtins(progress))
