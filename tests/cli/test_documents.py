@@ -40,6 +40,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "other.toml").write_text(
         text.replace('ACC = { raw = 30, value = "3.0 s"', 'ACC = { value = "4.5 s"'), "utf-8"
     )
+    (folder / "line.toml").write_bytes((SCHEMA.parent / "plan" / "hall-2.toml").read_bytes())
+    (folder / "scan.json").write_text('{"command": "scan", "event": "hit", "device": 2}', "utf-8")
     return folder
 
 
@@ -100,6 +102,9 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
     "what others say": (0, ("listen", "sim:atv71@2", "--for", "0.5"),
                         {"HeardExchangeDocument", "HeardSummaryDocument"}),
     "a list of statuses": (0, ("status", "sim:atv71@1,atv312@2", "--all"), {"StatusDocument"}),
+    "a line on paper": (0, ("plan", "FOLDER/line.toml"), {"PlanDocument"}),
+    "its beginning": (0, ("plan", "FOLDER/new-line.toml", "--from-scan", "FOLDER/scan.json"),
+                      {"PlanBegunDocument"}),
     "how it is simulated": (0, ("simulate", "--about", "atv21"), {"SimulatedBehaviorDocument"}),
     "no such code": (2, ("read", *DRIVE, "NOSUCH"), {"ErrorDocument"}),
 }  # fmt: skip

@@ -19,6 +19,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "journal": ("journal", "Watch", "Show writes, trips, runs and lost links of drives."),
     "lines": ("lines", "Share", "List named and remembered lines."),
     "listen": ("listen", "Troubleshoot", "Monitor traffic on a line; send nothing."),
+    "plan": ("plan", "Set up", "Check a planned line: wiring, times and parts."),
     "ports": ("ports", "Troubleshoot", "List the serial ports of this computer."),
     "profiles": ("profiles", "Profiles", "List, show or check drive profiles."),
     "prove": ("prove", "Run", "Test how a drive reacts to communication loss."),

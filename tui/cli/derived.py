@@ -24,6 +24,7 @@ import tui
 from tui import cli
 from tui.drive.small_file import read_small_text
 from tui.session.acceptance.schema import acceptance_schema
+from tui.session.line_plan.plan_file import plant_schema
 
 from . import commands
 from .command_index import COMMANDS
@@ -281,6 +282,7 @@ def write_derived() -> None:
         (DOCS / "cli.schema.json", documents_schema()),
         (DOCS / "drivepanel.1", man_page()),
         (DOCS / "acceptance" / "acceptance.schema.json", acceptance_schema()),
+        (DOCS / "plan" / "plan.schema.json", plant_schema()),
         (DOCS / "cli.md", with_table(page)),
     ):
         path.write_text(text, encoding="utf-8")

@@ -16,7 +16,7 @@ from tui.drive.sentences import any_of
 from .schema import ProfileData
 from .toml_lines import TomlPath
 
-LISTED_SINGLY = 12
+LISTED_SINGLY = 14
 """Most allowed values to list; of a longer list, only the nearest are named."""
 TEXT_FORMS = {
     r"^[0-9]+(\.[0-9]+)?$": 'a decimal number in quotes, such as "0.1"',
