@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tui.drive.profile.library import load
-from tui.simulator.about import BY_CHART, EVERY, Behavior, behaviors_of
+from tui.simulator.about import BY_CHART, EVERY, Behavior, behaviors_of, guessed_codes
 from tui.simulator.rules import TRAITS
 
 from .exchange import Exchange
@@ -25,6 +25,26 @@ def test_behavior_of_one_family_is_not_shown_for_another() -> None:
     assert "30 s" in texts("atv312")
     assert "30 s" not in texts("atv71")
     assert "FA50" not in texts("atv312")
+
+
+@pytest.mark.parametrize("family", TRAITS)
+def test_values_of_guesses_exist(family: str) -> None:
+    profile = load(family)
+    codes = guessed_codes(profile)
+    assert codes == {code for code in codes if profile.get(code) is not None}
+    thermal = profile.quantity("motor_thermal")
+    assert thermal is None or thermal.code in codes
+    printed = profile.quantity("output_frequency")
+    assert printed is None or printed.code not in codes
+
+
+def test_every_guess_of_a_value_names_one_that_exists() -> None:
+    rows = [row for rows in (EVERY, *BY_CHART.values()) for row in rows]
+    profiles = [load(family) for family in TRAITS]
+    known = {p.code for profile in profiles for p in profile.parameters}
+    known |= {p.quantity for profile in profiles for p in profile.parameters if p.quantity}
+    assert {mark for row in rows for mark in row.shows_in} <= known
+    assert all(row.provenance == "guess" for row in rows if row.shows_in)
 
 
 def test_named_families_exist() -> None:

@@ -53,6 +53,16 @@ def test_frames_are_explained(frames: list[tuple[str, str]], output: list[str]) 
     assert reported(*frames) == output
 
 
+def test_value_that_a_simulated_drive_guesses_is_marked_in_its_reply() -> None:
+    made = [
+        Frame(0.0, way, sealed(bytes.fromhex(text)))  # type: ignore[arg-type]
+        for way, text in (("out", "02 03 0C81 0002"), ("in", "02 03 04 0637 01F4"))
+    ]
+    texts = decoded(made, profile_of, no_raws, lambda _: {"RFR"}, tcp=False)
+    assert texts == ["2 read ETA RFR", "2 ETA 16#0637 · RFR 50.0 Hz (guess)"]
+    assert decoded(made, profile_of, no_raws, tcp=False)[1] == "2 ETA 16#0637 · RFR 50.0 Hz"
+
+
 def test_reply_of_another_drive_is_not_decoded_by_the_last_request() -> None:
     assert reported((">", "02 03 0C81 0001"), ("<", "03 03 02 0637"))[1] == "3 1 words"
 

@@ -26,6 +26,8 @@ class Behavior(NamedTuple):
     """Manual and chapter, public document, or the reason for the guess."""
     families: tuple[str, ...] = ()
     """Ids of the profiles that behave so; all of the kind without any."""
+    shows_in: tuple[str, ...] = ()
+    """Codes, or quantities, of the values that it decides."""
 
 
 EVERY: tuple[Behavior, ...] = (
@@ -39,11 +41,13 @@ EVERY: tuple[Behavior, ...] = (
         " thermal states.",
         "guess",
         "a plausible motor, not that of a model",
+        shows_in=("motor_thermal", "drive_thermal"),
     ),
     Behavior(
         "The load has 35 % of its torque at standstill, and grows with the square of the speed.",
         "guess",
         "like a fan with friction",
+        shows_in=("motor_current", "torque", "motor_load", "drive_load", "power"),
     ),
     Behavior(
         "Below 70 % of the rated supply, the drive trips on undervoltage.",
@@ -106,6 +110,7 @@ BY_CHART: Mapping[ChartKind, tuple[Behavior, ...]] = {
             " the write is refused.",
             "guess",
             "8.8 prints bits 1 to 15 as reserved, 8.2 a range of 0 to 255",
+            shows_in=("FA50",),
         ),
         Behavior(
             "The LOC/REM key always works; FD01 bit 15, FE45 and FE46 show local.",
@@ -132,6 +137,7 @@ BY_CHART: Mapping[ChartKind, tuple[Behavior, ...]] = {
             " current.",
             "guess",
             "8.3 prints no unit and no base",
+            shows_in=("FE76", "FE77", "FE20", "FE21"),
         ),
     ),
     "drivecom": (
@@ -158,6 +164,7 @@ BY_CHART: Mapping[ChartKind, tuple[Behavior, ...]] = {
             "guess",
             "no document says when it starts",
             ("atv31", "atv312"),
+            shows_in=("ttO",),
         ),
         Behavior(
             "The timeout ttO is accepted up to 30 s.",
@@ -197,6 +204,7 @@ BY_CHART: Mapping[ChartKind, tuple[Behavior, ...]] = {
             " poles.",
             "guess",
             "5.5 names no reference register",
+            shows_in=("1.21",),
         ),
         Behavior(
             "A wrong request is not answered.",
@@ -207,11 +215,13 @@ BY_CHART: Mapping[ChartKind, tuple[Behavior, ...]] = {
             "15.04 is a code: 0 is 300 baud, 9 is 115200. A change takes effect immediately.",
             "guess",
             "the PX-MODBUS manual 4 prints the codes, but not when a change takes effect",
+            shows_in=("15.04", "11.25"),
         ),
         Behavior(
             "15.07 counts 0.1 s: raw 250 is 25.0 s, 0 is off.",
             "guess",
             "the PX-MODBUS manual 4 prints 0.0 to 25.0 s, but not the scale",
+            shows_in=("15.07", "11.63"),
         ),
         Behavior(
             "The timeout starts with the first request, and the motor coasts.",
@@ -240,3 +250,15 @@ def behaviors_of(profile: Profile) -> list[Behavior]:
     """Return the behavior of a simulated drive, that of its family first."""
     own = BY_CHART[traits_of(profile).kind]
     return [item for item in own if not item.families or profile.id in item.families] + [*EVERY]
+
+
+def guessed_codes(profile: Profile) -> frozenset[str]:
+    """Return the codes of the values that a simulated drive of this family makes by a guess."""
+    marks = {
+        m for item in behaviors_of(profile) if item.provenance == "guess" for m in item.shows_in
+    }
+    return frozenset(
+        parameter.code
+        for parameter in profile.parameters
+        if parameter.code in marks or parameter.quantity in marks
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from tui.bus.api import Frame
@@ -21,6 +21,14 @@ CODES_OF_FRAME = 3
 
 ProfileOf = Callable[[int], Profile | None]
 RawsOf = Callable[[int], Mapping[str, int]]
+GuessesOf = Callable[[int], Collection[str]]
+GUESS = " (guess)"
+"""Mark of a value that a simulated drive makes by a guess."""
+
+
+def no_guesses(_: int) -> Collection[str]:
+    """Return the guesses of a real drive: none."""
+    return ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +42,17 @@ class DecodedRequest:
 
 
 def decoded(
-    frames: Sequence[Frame], profile_of: ProfileOf, raws_of: RawsOf, *, tcp: bool
+    frames: Sequence[Frame],
+    profile_of: ProfileOf,
+    raws_of: RawsOf,
+    guesses_of: GuessesOf = no_guesses,
+    *,
+    tcp: bool,
 ) -> list[str]:
     """Return a text for each frame; empty if its bytes cannot be decoded.
 
-    A reply to a read is decoded with the last request, which has the address.
+    A reply to a read is decoded with the last request, which has the address. Values of a reply are
+    marked if a simulated drive makes them by a guess.
     """
     requested: DecodedRequest | None = None
     found = []
@@ -48,7 +62,9 @@ def decoded(
             found.append("")
             continue
         space = READ_INPUT if pdu.function == READ_INPUT else READ
-        words = _Words(pdu.device, profile_of(pdu.device), raws_of(pdu.device), space)
+        device = pdu.device
+        guesses = guesses_of(device) if frame.direction == "in" else ()
+        words = _Words(device, profile_of(device), raws_of(device), space, guesses)
         try:
             if frame.direction == "out":
                 requested = _requested(pdu)
@@ -122,6 +138,7 @@ class _Words:
     profile: Profile | None
     raws: Mapping[str, int]
     function: int = READ
+    guesses: Collection[str] = ()
 
     def names(self, address: int, count: int) -> str:
         """Return the codes of the parameters at these registers; the address if all are unknown."""
@@ -138,7 +155,8 @@ class _Words:
         """Return the parameters with their values; `sign` precedes each value."""
         parts = []
         for code, text, where in self._cut(address, raws):
-            parts.append(f"{code or where} {sign + ' ' if sign else ''}{text}")
+            mark = GUESS if code in self.guesses else ""
+            parts.append(f"{code or where} {sign + ' ' if sign else ''}{text}{mark}")
         return " · ".join(parts)
 
     def _cut(self, address: int, raws: Sequence[int]) -> Iterable[tuple[str, str, str]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import ClassVar, Literal, Protocol
 
 from rich.text import Text
@@ -180,7 +180,12 @@ class FrameListScreen(PanelScreen):
         return [reported[at - first] for at in places]
 
     def _texts_of(self, frames: Sequence[Frame]) -> list[str]:
-        return decoded(frames, self._source.profile, self._source.raws, tcp=self._is_tcp)
+        source = self._source
+        return decoded(frames, source.profile, source.raws, self._guesses, tcp=self._is_tcp)
+
+    def _guesses(self, device: int) -> Collection[str]:
+        """Return the codes that a simulated drive makes by a guess; none of a real drive."""
+        return ()
 
     @property
     def _is_tcp(self) -> bool:

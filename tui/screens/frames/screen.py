@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import ClassVar
 
 from rich.text import Text
@@ -38,6 +38,8 @@ class CounterKeys(PanelScreen):
         self.console = console
         self.session = console.session
         self._looking = False
+        self._guessed: dict[str, frozenset[str]] = {}
+        """Codes that simulated drives make by a guess, by profile."""
 
     def on_mount(self) -> None:
         """Read the drive's own counters periodically while they are shown."""
@@ -163,6 +165,16 @@ class FramesScreen(CounterKeys, FrameListScreen):
     def on_mount(self) -> None:
         """Use the line of the drive as the source of frames."""
         self._source = OwnFrames(self.session.line, self.app)
+
+    def _guesses(self, device: int) -> Collection[str]:
+        opened, profile = self.app.opened, self._source.profile(device)
+        if opened is None or opened.simulation is None or profile is None:
+            return ()
+        if profile.id not in self._guessed:
+            from tui.simulator.about import guessed_codes
+
+            self._guessed[profile.id] = guessed_codes(profile)
+        return self._guessed[profile.id]
 
     @property
     def shows_counters(self) -> bool:
