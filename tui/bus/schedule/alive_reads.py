@@ -63,7 +63,8 @@ class AliveReads:
         """Queue the read of a device if it is due; returns when to look again."""
         period = alive.timeout / READS_PER_TIMEOUT
         retry = min(LONGEST_RETRY, period / 2)
-        heard = max(self._devices[alive.device].heard or 0.0, self._since[alive.device])
+        since = self._since[alive.device]
+        heard = max(self._devices[alive.device].heard or since, since)
         due, last = heard + period, self._jobs.get(alive.device)
         if last is not None and last.requested > heard:
             # it waits for the line, or was not answered

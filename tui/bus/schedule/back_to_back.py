@@ -73,8 +73,10 @@ class BackToBack:
 
     def _gap(self, now: float) -> float:
         """Seconds for which no poll begins, as a program may ask."""
-        longest = max(self._rests, default=0.0)
-        if len(self._rests) < PAUSES or longest <= LONGEST_PAUSE or now > self._ended + 2 * longest:
+        if len(self._rests) < PAUSES:
+            return 0.0
+        longest = max(self._rests)
+        if longest <= LONGEST_PAUSE or now > self._ended + 2 * longest:
             return 0.0
         return min(GAP * self._polled, LONGEST_GAP)
 
