@@ -366,6 +366,8 @@ async def test_request_is_sent_unless_it_is_forbidden(why: str) -> None:
     if why:
         assert (type(error_of(job)), str(error_of(job))) == (RequestRefused, why)
         return
+    rig.steps.end_form.assert_called_once_with(job, REPLY)
+    rig.outcomes.waited_for_us.assert_called_once_with(job, REPLY)
     assert (rig.flights, rig.it.in_flight, job.begun) == ([True], False, True)
     assert job.answer.result(0) is reply
     rig.outcomes.values.drop.assert_called_once_with(1)
@@ -500,6 +502,41 @@ async def test_request_is_held_back_at_the_last_moment(
         assert (type(error_of(job)), str(error_of(job))) == (RequestRefused, why)
     else:
         assert not job.answer.done()
+
+
+@pytest.mark.parametrize(
+    ("keeps_alive", "skip", "mistakable"), [(True, 2, True), (True, 0, False), (False, 2, False)]
+)
+def test_keep_alive_read_does_not_wait_for_the_second_of_two_replies(
+    keeps_alive: bool, skip: int, mistakable: bool
+) -> None:
+    rig, job = Rig(), job_of(keeps_alive=keeps_alive)
+    rig.devices.doubts.return_value = (True, skip)
+    assert rig.it._sending(job).skip == (0 if mistakable else skip)
+    assert job.mistakable == mistakable
+
+
+@pytest.mark.parametrize("state", ["due", "done", "waits"])
+async def test_request_whose_reply_cannot_be_judged_fails(state: str) -> None:
+    rig, job = Rig(REPLY), job_of(WRITE)
+
+    def conclude(*_: object) -> None:
+        if state == "done":
+            job.fail(LineLost("before"))
+        elif state == "waits":
+            rig.it._queue.put_back(job)
+        raise ZeroDivisionError("odd")
+
+    rig.it._conclude = conclude
+    with pytest.raises(ZeroDivisionError):
+        await rig.run(job)
+    assert job.answer.done() == (state != "waits")
+    if state == "due":
+        assert type(error_of(job)) is LineFailed
+        assert str(error_of(job)).startswith(
+            "The reply could not be judged: ZeroDivisionError('odd')."
+        )
+        assert len(str(error_of(job))) > 60, "the write may have taken effect"
 
 
 def test_request_is_sent_with_its_timeout_and_doubts() -> None:

@@ -272,6 +272,25 @@ def test_reply_of_a_weak_form_proves_the_step_if_it_differs_from_the_last() -> N
     assert rig.it._next_check == NOW + 2000.0 / in_step.CHECK_SHARE
 
 
+@pytest.mark.parametrize("weak", [True, False])
+def test_reply_that_may_be_that_of_an_earlier_request_proves_nothing(weak: bool) -> None:
+    rig, job = Rig(), job_of(mistakable=True)
+    rig.earlier.append(OTHER.expectation())
+    if weak:
+        rig.it._weak.add(1)
+        rig.earlier.extend((READ.expectation(), OTHER.expectation()))
+    rig.note(REPLY, job=job)
+    assert rig.it._proved == set()
+
+
+def test_proof_ends_the_suspicion() -> None:
+    rig = Rig()
+    rig.earlier.append(OTHER.expectation())
+    rig.it._shifts, rig.it.quiet_until, rig.it.behind = 1, NOW + 5, BEHIND
+    rig.note(REPLY)
+    assert (rig.it._shifts, rig.it.quiet_until, rig.it.behind) == (0, 0.0, "")
+
+
 @pytest.mark.parametrize("gateway", [True, False])
 def test_unanswered_request_ends_the_proof_of_its_device_or_of_all_of_a_gateway(
     gateway: bool,

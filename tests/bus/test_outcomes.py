@@ -308,6 +308,50 @@ def test_reply_that_waited_for_this_program_is_requested_again(
         assert ends.outcomes.waited_for_us(job, result) == doubted
 
 
+def test_reply_at_the_end_of_its_time_is_not_requested_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ends, job = Ends(), read()
+    monkeypatch.setattr(outcomes_module, "STILL", 1.0)
+    monkeypatch.setattr(ends.devices, "time_out", lambda *_: 0.5)
+    for end, again in ((8.75, False), (8.5, True)):
+        result = ExchangeResult(ResultKind.REPLY, end=end, turnaround=0.25)
+        assert ends.outcomes.waited_for_us(job, result) == again
+
+
+@pytest.mark.parametrize("kind", [ResultKind.REPLY, ResultKind.EXCEPTION])
+def test_device_learns_from_each_reply(kind: ResultKind, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends, job = Ends(), read()
+    learned: list[object] = []
+    monkeypatch.setattr(ends.devices, "answered", lambda *of, **how: learned.append((of, how)))
+    ends.end(job, kind, pdu=VALUE, exception=2)
+    refused = {"refused": kind is ResultKind.EXCEPTION}
+    assert learned == [((1, job.expectation, 0.125, 10.0, (job.pdu, VALUE)), refused)]
+
+
+def test_guess_about_a_wrong_reply_can_be_judged_later(monkeypatch: pytest.MonkeyPatch) -> None:
+    ends = Ends()
+    before: Any = object()
+    seen: list[object] = []
+
+    def known_before(*of: object) -> Any:
+        seen.append(of)
+        return before
+
+    monkeypatch.setattr(outcomes_module, "known_before", known_before)
+    monkeypatch.setattr(ends.outcomes, "note_strays", lambda *_: set())
+    ends.end(read(), ResultKind.WRONG, strays=[Piece(b"", True)])
+    assert ends.devices[1].guess is before
+    assert seen == [(ends.devices[1], 9.5)]
+
+
+def test_frames_beside_a_broadcast_are_counted() -> None:
+    ends = Ends()
+    stray = Piece(bytes([1, *VALUE, 0, 0]), True)
+    ends.end(Job(WriteOne(0, 1, 1), Priority.STOP, WIDE), ResultKind.NOTHING, strays=[stray])
+    assert ends.tally.stale == 1
+
+
 # -- what is counted and reported ------------------------------------------------------------------
 
 
