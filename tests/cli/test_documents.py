@@ -96,6 +96,11 @@ RUNS: dict[str, tuple[int, tuple[str, ...], set[str]]] = {
     "its folder": (0, ("profiles", "path"), {"ProfileFolder"}),
     "a new one": (0, ("profiles", "new", "mine", "--from", "atv312"), {"ProfileBegun"}),
     "a proof": (2, ("profiles", "--prove", "FOLDER/set.toml"), {"ProofDocument"}),
+    "a drive's evidence": (
+        0,
+        ("profiles", "confirm", "powerdrive", "sim:powerdrive", "--to", "FOLDER/evidence.json"),
+        {"ConfirmDocument"},
+    ),
     "a check": (2, ("profiles", "--check", "FOLDER/set.toml"), {"CheckDocument"}),
     "ports": (0, ("ports",), set()),
     "names of lines": (0, ("lines",), {"LinesDocument"}),

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 
+from tui.drive.profile.example_frames import all_frames
 from tui.simulator import DriveSpec, SimulatedDrive
 
 
@@ -24,18 +23,17 @@ class Frame:
 
 
 def _frames() -> list[Frame]:
-    rows = json.loads((Path(__file__).parent / "frames.json").read_text(encoding="utf-8"))
     return [
         Frame(
             number,
-            row["family"],
-            row["section"],
-            row["direction"],
-            bytes.fromhex(row["hex"]),
-            bytes.fromhex(row["printed"]) if "printed" in row else None,
-            row["meaning"],
+            row.family,
+            row.section,
+            row.direction,
+            row.data,
+            bytes.fromhex(row.printed) if row.printed else None,
+            row.meaning,
         )
-        for number, row in enumerate(rows)
+        for number, row in enumerate(all_frames())
     ]
 
 

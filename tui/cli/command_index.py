@@ -21,7 +21,7 @@ COMMANDS: dict[str, tuple[str, str, str]] = {
     "listen": ("listen", "Troubleshoot", "Monitor traffic on a line; send nothing."),
     "plan": ("plan", "Set up", "Check a planned line: wiring, times and parts."),
     "ports": ("ports", "Troubleshoot", "List the serial ports of this computer."),
-    "profiles": ("profiles", "Profiles", "List, show or check drive profiles."),
+    "profiles": ("profiles", "Profiles", "List, show, check or confirm drive profiles."),
     "prove": ("prove", "Run", "Test how a drive reacts to communication loss."),
     "publish": ("publish", "Share", "Publish drive values to an MQTT broker."),
     "read": ("read", "Watch", "Read parameters from a drive."),

@@ -22,6 +22,9 @@ import msgspec
 
 import tui
 from tui import cli
+from tui.drive.profile.evidence import all_evidence
+from tui.drive.profile.library import submitted_folder
+from tui.drive.profile.schema import EvidenceResult, ProfileEvidence
 from tui.drive.small_file import read_small_text
 from tui.session.acceptance.schema import acceptance_schema
 from tui.session.line_plan.plan_file import plant_schema
@@ -38,6 +41,7 @@ _LINE_HELP, _, _STATUSES = (main.epilog or "").partition("Exit status:")
 FILES = (
     ("$XDG_CONFIG_HOME/drivepanel/settings.toml", "Names of lines; the record on or off."),
     ("$XDG_CONFIG_HOME/drivepanel/profiles/", "Profiles of your own."),
+    ("$XDG_CONFIG_HOME/drivepanel/evidence/", "Evidence about profiles from drives of this site."),
     ("$XDG_STATE_HOME/drivepanel/journal.jsonl", "The journal of writes to drives."),
     ("$XDG_STATE_HOME/drivepanel/record/", "The records of lines, one file for each day."),
     ("$XDG_STATE_HOME/drivepanel/drivepanel.log", "The log."),
@@ -264,6 +268,35 @@ def _table() -> str:
     return "\n".join([*head, *rows, "", ""])
 
 
+CONFIRMED_TABLE = re.compile(r"(<!-- confirmed -->\n).*?(<!-- end of confirmed -->)", re.DOTALL)
+
+
+def with_confirmed(page: str, folder: Path) -> str:
+    """The page docs/confirmed.md with the evidence of a folder; only real drives count."""
+    found = [each for each in all_evidence(folder) if each.tested.kind == "drive"]
+    head = ["", "| profile | drive | firmware | tested on | values compared | contradicted |"]
+    head.append("|---|---|---|---|---|---|")
+    rows = [
+        f"| {_cell(each.profile)} | {_cell(each.tested.reference)} | {_cell(each.tested.firmware)}"
+        f" | {_cell(each.date[:10])}, {_cell(each.tested.link)}"
+        f" | {_names(each, 'confirmed', 'value')} | {_names(each, 'contradicted')} |"
+        for each in found
+    ]
+    text = "\n".join([*head, *rows] if rows else ["", "No drive was confirmed yet."])
+    return CONFIRMED_TABLE.sub(lambda old: f"{old[1]}{text}\n\n{old[2]}", page)
+
+
+def _names(evidence: ProfileEvidence, result: EvidenceResult, subject: str = "") -> str:
+    """The findings with a result, for a cell."""
+    found = [f for f in evidence.findings if f.result == result and subject in ("", f.subject)]
+    return ", ".join(_cell(f.name or f.subject) for f in found)
+
+
+def _cell(text: str) -> str:
+    """A text of a file, which is never markup, for a cell of a table."""
+    return re.sub(r"[|\\`<>*_\[\]\n]", " ", text)
+
+
 def _anchor(name: str) -> str:
     """The section of a command; some have one together."""
     heads = re.findall(r"^## (.+)$", read_small_text(DOCS / "cli.md"), re.MULTILINE)
@@ -284,6 +317,10 @@ def write_derived() -> None:
         (DOCS / "acceptance" / "acceptance.schema.json", acceptance_schema()),
         (DOCS / "plan" / "plan.schema.json", plant_schema()),
         (DOCS / "cli.md", with_table(page)),
+        (
+            DOCS / "confirmed.md",
+            with_confirmed(read_small_text(DOCS / "confirmed.md"), submitted_folder()),
+        ),
     ):
         path.write_text(text, encoding="utf-8")
 

@@ -17,6 +17,7 @@ from .profile.profile import Profile
 from .profile.schema import Confidence, Connector, LineSchematic, ProfileData
 
 SURENESS: dict[Confidence, str] = {
+    "site": "proved on this site",
     "manual": "",
     "manual+public": "",
     "public-x2": "public documents",

@@ -11,11 +11,13 @@ from tui.drive.plain import plain
 from tui.drive.sentences import counted
 
 from ..shared.completion import complete_profile
-from ..shared.errors import DIFFERENT
-from ..shared.options import json_option
-from ..shared.registration import command
+from ..shared.errors import DIFFERENT, end_with
+from ..shared.line_argument import named_line_of
+from ..shared.options import SLAVE_ADDRESS, Target, json_option
+from ..shared.registration import ON_LINE, command
 from ..shared.rows import GAP, Column, row_text, table_of
 from ..shared.say import say
+from ..shared.sets import refuse_output
 from ..shared.standard_streams import given_file
 
 if TYPE_CHECKING:
@@ -34,11 +36,15 @@ PARAMETER_COLUMNS = (
 )
 
 
-@command("List, show or check drive profiles.", group="Profiles", statuses=(DIFFERENT,))
+@command(
+    "List, show, check or confirm drive profiles.",
+    group="Profiles",
+    statuses=(DIFFERENT, *ON_LINE),
+)
 @click.argument(
     "profile_id",
     required=False,
-    metavar="[ID|new NEW-ID|path]",
+    metavar="[ID|new NEW-ID|confirm ID LINE [CODE...]|path]",
     shell_complete=complete_profile,
 )
 @click.argument("more", nargs=-1, metavar="")
@@ -57,6 +63,21 @@ PARAMETER_COLUMNS = (
     help="Test profile files on the drives simulated from them.",
 )
 @click.option("--from", "origin", metavar="ID", help="Copy this profile; for new.")
+@click.option(
+    "-d",
+    "--device",
+    type=SLAVE_ADDRESS,
+    metavar="ADDRESS",
+    help="Use the drive at this slave address (default: 1).",
+)
+@click.option(
+    "--to",
+    "to",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write the evidence to this file; for confirm.",
+)
+@click.option("--force", is_flag=True, help="Replace the file of --to if it exists.")
 @click.option("--schema", is_flag=True, help="Print the JSON schema: every field, described.")
 @click.option(
     "--wiring",
@@ -70,6 +91,9 @@ def profiles(
     file: Path | None,
     proved: Path | None,
     origin: str | None,
+    device: int | None,
+    to: Path | None,
+    force: bool,
     schema: bool,
     wiring: bool,
     as_json: bool,
@@ -77,12 +101,16 @@ def profiles(
     """List the profiles, show one, check files, or create one of your own.
 
     `path` shows the folder for your own profiles; `new NEW-ID --from ID` creates one there.
+    `confirm ID LINE` compares a drive with its profile and writes the result to a file. It only
+    reads. A person is asked what the display shows, for each CODE or for the usual values.
     """
-    if wiring and (profile_id in (None, "new", "path")):
+    if wiring and profile_id in (None, "new", "path", "confirm"):
         raise click.UsageError("--wiring is of one profile: name its ID.")
     from tui.drive.profile import library
 
     words = (*((profile_id,) if profile_id is not None else ()), *more)
+    if words[:1] != ("confirm",) and (device is not None or to is not None or force):
+        raise click.UsageError("-d, --to and --force are for: profiles confirm ID LINE.")
     if proved is not None:
         from ..running.profile_proof import prove_files
 
@@ -95,6 +123,8 @@ def profiles(
         say(schema_text().rstrip())
     elif words[:1] == ("new",):
         _begin(words[1:], origin, as_json)
+    elif words[:1] == ("confirm",):
+        _confirm(words[1:], device, to, force=force, as_json=as_json)
     elif more or origin is not None:
         raise click.UsageError("Name one ID, or: profiles new NEW-ID --from ID.")
     elif profile_id == "path":
@@ -105,6 +135,25 @@ def profiles(
         _show(library.load(profile_id), as_json)
     else:
         _list(as_json)
+
+
+def _confirm(
+    words: tuple[str, ...], device: int | None, to: Path | None, *, force: bool, as_json: bool
+) -> None:
+    """Compare a drive with its profile; the status is 1 if it contradicts a statement."""
+    if len(words) < 2:
+        raise click.UsageError("Name a profile and a line: profiles confirm ID LINE.")
+    from ..running.confirming import confirm_profile
+
+    profile_id, line, *codes = words
+    if (named := named_line_of(line)) is not None:
+        line, device = named.line, device or named.device
+    if force and to is None:
+        raise click.UsageError("--force requires --to FILE.")
+    if to is not None:
+        refuse_output(to, force=force, as_json=as_json)
+    target = Target(line, device or 1, profile_id)
+    end_with(confirm_profile(target, codes, to, force=force, as_json=as_json))
 
 
 def check_files(files: list[Path], as_json: bool) -> None:

@@ -19,7 +19,7 @@ from typing import Any
 
 import msgspec
 
-from .schema import FamilySearch, HelpData, ProfileData, Table
+from .schema import FamilySearch, HelpData, ProfileData, ProfileEvidence, Table
 
 COMMON: Mapping[str, str] = {
     "id": "Identifier inside the profile, in lower case.",
@@ -334,6 +334,7 @@ SCHEMA_FORMS: dict[str, tuple[type[Table], str]] = {
     "profile": (ProfileData, "Drive Panel profile"),
     "help": (HelpData, "Drive Panel help of faults"),
     "search": (FamilySearch, "Drive Panel words of a search"),
+    "evidence": (ProfileEvidence, "Drive Panel evidence about a profile"),
 }
 """The forms of files and their titles."""
 

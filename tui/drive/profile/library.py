@@ -61,6 +61,16 @@ def user_folder() -> Path:
         return Path(os.devnull) / "profiles"
 
 
+def evidence_folder() -> Path:
+    """Return the folder for evidence about profiles at this site, in the configuration folder."""
+    return user_folder().parent / "evidence"
+
+
+def submitted_folder() -> Path:
+    """Return the folder for evidence that was submitted to the project."""
+    return packaged_folder() / "evidence"
+
+
 def profile_files() -> Iterator[tuple[Path, bool]]:
     """Return every profile file, with True for the user's own; the user's come first."""
     for folder, own in ((user_folder(), True), (packaged_folder(), False)):
@@ -112,9 +122,20 @@ def load(profile_id: str) -> Profile:
     """
     for listing in listings():
         if listing.id == profile_id.strip().lower():
-            return load_file(listing.path)
+            return _with_evidence(load_file(listing.path))
     known = ", ".join(item.id for item in listings())
     raise UnknownProfile(f"There is no profile {profile_id!r}. Profiles: {known}.")
+
+
+def _with_evidence(profile: Profile) -> Profile:
+    """Return a profile with what evidence of this site proves."""
+    if not (folder := evidence_folder()).is_dir():
+        return profile
+    from .evidence import all_evidence, with_evidence
+    from .profile import Profile
+
+    data = with_evidence(profile.data, all_evidence(folder))
+    return profile if data is profile.data else Profile(data, profile.read_help)
 
 
 def load_file(path: Path) -> Profile:

@@ -13,6 +13,7 @@ from tui.session.shown import Drawn
 from tui.widgets.palette import age_text
 
 CONFIDENCE_WORDS: dict[Confidence, str] = {
+    "site": "proved on this site",
     "manual": "manual",
     "manual+public": "manual and public files",
     "public-x2": "two public files",

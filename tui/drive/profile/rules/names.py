@@ -11,7 +11,7 @@ from tui.drive.sentences import any_of
 from ..schema import Chart, Parameter, ProfileData, path_places
 from ..toml_lines import TomlPath
 
-TAKEN_IDS = frozenset({"new", "path"})
+TAKEN_IDS = frozenset({"confirm", "new", "path"})
 NamedPlace = tuple[TomlPath, str]
 """A place that names a parameter, and the code."""
 WORD_FORMS = {

@@ -224,4 +224,14 @@ def fault_help(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         yield ("faults", "help", place[1]), fault
 
 
-PARAMETER_RULES = (unique_names, fields, enumeration_keys, fault_help)
+def no_site(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield parameters that claim what only evidence of this site can prove."""
+    for index, parameter in enumerate(data.parameters):
+        if parameter.confidence == "site":
+            yield (
+                ("parameters", index, "confidence"),
+                f"parameter {parameter.code}: site is proved by evidence, not by a profile.",
+            )
+
+
+PARAMETER_RULES = (unique_names, fields, enumeration_keys, fault_help, no_site)

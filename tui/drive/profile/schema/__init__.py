@@ -39,6 +39,7 @@ from .chart import (
     TeachableReference,
     Transition,
 )
+from .evidence import EvidenceDrive, EvidenceFinding, EvidenceResult, ProfileEvidence
 from .fault_help import (
     AlarmHelp,
     CauseRule,
@@ -158,6 +159,9 @@ __all__ = [
     "Effective",
     "Enumeration",
     "Erratum",
+    "EvidenceDrive",
+    "EvidenceFinding",
+    "EvidenceResult",
     "ExceptionCode",
     "FactoryBy",
     "FamilySearch",
@@ -207,6 +211,7 @@ __all__ = [
     "PortPolarization",
     "Predecessor",
     "ProfileData",
+    "ProfileEvidence",
     "ProfileHead",
     "Quantity",
     "RawWord",

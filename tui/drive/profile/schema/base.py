@@ -18,8 +18,11 @@ SignedDecimalText = Annotated[str, Meta(pattern=r"^-?[0-9]+(\.[0-9]+)?$")]
 Identifier = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")]
 BitNumber = Annotated[int, Meta(ge=0, le=15)]
 
-Confidence = Literal["manual", "manual+public", "public-x2", "public", "analogy", "unverified"]
-"""Certainty of a fact, best first; below `public` it is shown as unverified."""
+Confidence = Literal[
+    "site", "manual", "manual+public", "public-x2", "public", "analogy", "unverified"
+]
+"""Certainty of a fact, best first; below `public` it is shown as unverified. `site` is proved by
+evidence of this site, and never in a file."""
 
 Effective = Literal["at-once", "after-reset"]
 

@@ -1,0 +1,183 @@
+"""`drivepanel profiles confirm`: what one drive shows about the statements of its profile."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import tui
+from tui.drive.sentences import counted
+
+from ..shared.errors import DIFFERENT, DONE, Failure
+from ..shared.options import Target, connect_drive, on_line
+from ..shared.output import print_json
+from ..shared.say import say
+from ..shared.sets import counter, write_down
+from .asking import may_ask, says_yes, typed_answer
+
+if TYPE_CHECKING:
+    from tui.drive.profile.schema import EvidenceFinding, Parameter, ProfileEvidence
+    from tui.session.conformance import Conformance
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
+
+    from ..documents.evidence_documents import ConfirmDocument
+
+LISTED = 20
+"""Open statements that a person is shown; the file has all."""
+
+
+def confirm_profile(
+    target: Target, codes: Sequence[str], file: Path | None, *, force: bool, as_json: bool
+) -> int:
+    """Test one drive, write its evidence, and return the exit status.
+
+    Status 1 is a contradicted statement. `codes` are compared with the display; by default the
+    measured values and ratings. `file` is by default a new one in the folder of this site, where
+    it counts; evidence that proves nothing must be given a name.
+    """
+
+    async def work(opened: OpenLine) -> int:
+        from tui.drive.profile.library import evidence_folder
+        from tui.session.conformance import Conformance
+
+        session = await connect_drive(opened, target._replace(force_profile=True))
+        wanted = [session.profile.find(code).code for code in codes]
+        kind = await _kind(opened)
+        test = Conformance(session)
+        await test.run(counter("Read"))
+        for code in (wanted or test.codes_to_ask()) if may_ask() else wanted:
+            await _ask_display(test, code)
+        evidence = _evidence(session, test.findings, kind)
+        now = datetime.now().strftime("%Y%m%d-%H%M%S")
+        path = file or evidence_folder() / f"{session.profile.id}-{now}.json"
+        if file is None and kind != "drive":
+            path = Path(f"{session.profile.id}-{now}.json")
+        await asyncio.to_thread(_write, path, evidence, force=force)
+        _report(evidence, path, as_json=as_json)
+        return DIFFERENT if evidence.count("contradicted") else DONE
+
+    return on_line(target, work, read_only=True)
+
+
+async def _kind(opened: OpenLine) -> str:
+    """Return whether the drive is a real one, as a person says; a simulated one is never asked."""
+    if opened.simulation is not None:
+        return "simulated"
+    if not may_ask():
+        return "unknown"
+    question = "Is this a real drive, not a simulated one? Only a real one proves anything."
+    return "drive" if await says_yes(question) else "simulated"
+
+
+async def _ask_display(test: Conformance, code: str) -> None:
+    """Ask until the answer is a value, or is left open."""
+    from tui.drive.errors import ValueRefused
+
+    async def ask(parameter: Parameter) -> str:
+        if not may_ask():
+            return ""
+        return await typed_answer(
+            f"{parameter.code}, {parameter.name}: what does the drive's display show?"
+            " (Enter: leave open)"
+        )
+
+    while True:
+        try:
+            finding = await test.compare_display(code, ask)
+        except ValueRefused as refused:
+            say(f"drivepanel: {refused}", err=True)
+        else:
+            if finding.result != "open":
+                say(f"{code}: {finding.result}. {finding.seen}", err=True)
+            return
+
+
+def _evidence(session: DriveSession, findings: list[EvidenceFinding], kind: str) -> ProfileEvidence:
+    from tui.drive.profile.schema import EvidenceDrive, ProfileEvidence
+    from tui.session.journal import now_text
+
+    identity = session.known_identity
+    tested = EvidenceDrive(
+        vendor=identity.vendor,
+        reference=identity.reference,
+        firmware=identity.version_text if identity.version else "",
+        kind=kind,  # type: ignore[arg-type]
+        link=_link_text(session),
+    )
+    return ProfileEvidence(
+        profile=session.profile.id,
+        date=now_text(),
+        program=tui.__version__,
+        tested=tested,
+        findings=findings,
+    )
+
+
+def _link_text(session: DriveSession) -> str:
+    """Return the kind of the line and its settings, without the name of a port or host."""
+    from tui.bus.link import RtuTcpLink, SerialLink
+
+    link = session.line.link
+    if isinstance(link, SerialLink):
+        return f"RTU {link.baud} {link.format}"
+    return "RTU over TCP" if isinstance(link, RtuTcpLink) else "Modbus TCP"
+
+
+def _write(path: Path, evidence: ProfileEvidence, *, force: bool) -> None:
+    """Write the file completely or not at all. Raises Failure."""
+    from tui.drive.profile.evidence import evidence_text
+
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise Failure(f"{path} cannot be written: {error.strerror or error}.", 2) from error
+    write_down(path, evidence_text(evidence), force=force)
+
+
+def _document(evidence: ProfileEvidence, path: Path) -> ConfirmDocument:
+    import msgspec
+
+    from ..documents.evidence_documents import ConfirmDocument, FindingField
+
+    return ConfirmDocument(
+        profile=evidence.profile,
+        file=str(path),
+        tested_on=evidence.tested.kind,
+        reference=evidence.tested.reference,
+        firmware=evidence.tested.firmware,
+        confirmed=evidence.count("confirmed"),
+        contradicted=evidence.count("contradicted"),
+        open=evidence.count("open"),
+        findings=[FindingField(**msgspec.structs.asdict(f)) for f in evidence.findings],
+    )
+
+
+def _report(evidence: ProfileEvidence, path: Path, *, as_json: bool) -> None:
+    if as_json:
+        print_json(_document(evidence, path))
+        return
+    for result in ("contradicted", "confirmed", "open"):
+        found = [f for f in evidence.findings if f.result == result]
+        if result == "confirmed":
+            found = [f for f in found if f.subject != "address"]
+        for finding in found[:LISTED]:
+            name = finding.name
+            if finding.subject == "frame":
+                name = f"{name}, {finding.statement.partition(' ')[0]}"
+            say(f"{result:<12}  {finding.subject} {name}: {finding.seen}", indent=14)
+        if len(found) > LISTED:
+            say(f"{result:<12}  and {len(found) - LISTED} more in the file")
+    say(
+        f"{evidence.count('confirmed')} confirmed, {evidence.count('contradicted')} contradicted,"
+        f" {evidence.count('open')} open. ProfileEvidence: {path}"
+    )
+    proved = sum(f.subject == "value" and f.result == "confirmed" for f in evidence.findings)
+    if evidence.tested.kind != "drive":
+        say("It proves nothing: no person has said that this is a real drive.")
+    elif proved:
+        texts = ("1 value is proved on this site.", "{count} values are proved on this site.")
+        say(counted(proved, *texts))

@@ -1,0 +1,55 @@
+"""Example frames of the manuals: requests with their replies, from `frames.json`."""
+
+from __future__ import annotations
+
+import msgspec
+
+from ..small_file import read_small
+from .library import packaged_folder
+from .profile import Profile
+
+
+class ExampleFrame(msgspec.Struct, frozen=True):
+    """One frame of a manual, with its checksum."""
+
+    family: str
+    section: str
+    direction: str
+    hex: str
+    meaning: str
+    printed: str = ""
+    """The printed form, if it has a misprint."""
+
+    @property
+    def data(self) -> bytes:
+        """The frame as it is sent."""
+        return bytes.fromhex(self.hex)
+
+
+class FramePair(msgspec.Struct, frozen=True):
+    """A request, and the replies that the manual prints for it, one for each situation."""
+
+    request: ExampleFrame
+    replies: tuple[ExampleFrame, ...]
+
+
+def all_frames() -> list[ExampleFrame]:
+    """Return all frames, in the order of their manuals."""
+    path = packaged_folder() / "frames.json"
+    return msgspec.json.decode(read_small(path), type=list[ExampleFrame])
+
+
+def example_frames_of(profile: Profile) -> list[FramePair]:
+    """Return the requests of the family's manual with their replies."""
+    head = profile.data.profile
+    families = {head.id, *(name.removesuffix(".rows") for name in head.rows_from)}
+    pairs: list[FramePair] = []
+    for frame in all_frames():
+        if frame.family not in families:
+            continue
+        if frame.direction == "request":
+            pairs.append(FramePair(frame, ()))
+        else:
+            last = pairs[-1]
+            pairs[-1] = FramePair(last.request, (*last.replies, frame))
+    return pairs

@@ -1,0 +1,56 @@
+"""Form of a file of evidence: what one drive showed about the statements of a profile."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from .base import Table
+
+EvidenceResult = Literal["confirmed", "contradicted", "open"]
+EvidenceSubject = Literal["identity", "address", "range", "value", "frame"]
+
+
+class EvidenceDrive(Table, frozen=True, kw_only=True):
+    """The drive as it identified itself."""
+
+    vendor: str = ""
+    reference: str = ""
+    firmware: str = ""
+    """Version that the drive reports; empty if it reports none."""
+    kind: Literal["drive", "simulated", "unknown"]
+    """`drive` if a person said that it is a real one. Only then does the file prove anything."""
+    link: str
+    """Kind and settings of the line, without its name: RTU 19200 8E1."""
+
+
+class EvidenceFinding(Table, frozen=True, kw_only=True):
+    """EvidenceResult for one statement of the profile."""
+
+    subject: EvidenceSubject
+    """`address`: the parameter can be read there. `range`: its value is one that the profile lets
+    it have. `value`: the display shows the same value. `frame`: the reply has the printed form."""
+    name: str
+    """Code of the parameter, or the section of the manual with the frame; empty for the drive."""
+    statement: str = ""
+    """The statement as tested, so that a changed profile is not proved by it."""
+    result: EvidenceResult
+    seen: str = ""
+    """Observation on this drive."""
+
+
+class ProfileEvidence(Table, frozen=True, kw_only=True):
+    """One test of one drive."""
+
+    format: Literal[1] = 1
+    profile: str
+    """Id of the profile."""
+    date: str
+    """Time of the test, with its zone."""
+    program: str
+    """Version of Drive Panel."""
+    tested: EvidenceDrive
+    findings: list[EvidenceFinding]
+
+    def count(self, result: EvidenceResult) -> int:
+        """Return the number of findings with a result."""
+        return sum(finding.result == result for finding in self.findings)
