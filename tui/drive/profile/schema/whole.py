@@ -55,6 +55,7 @@ class Predecessor(Table, frozen=True, kw_only=True):
     """
 
     profile: Identifier
+    """Id of the profile of that family."""
     same_codes: bool = False
     """True if settings with the same code mean the same."""
     codes: dict[str, str] = {}
@@ -110,6 +111,7 @@ class MemoryOrders(Table, frozen=True, kw_only=True):
     save: MemoryOrder | None = None
     factory: MemoryOrder | None = None
     eeprom: Eeprom = Eeprom()
+    """Life of the EEPROM, and further words that save."""
     busy_mask: RawWord = 0
     """Bits of the extended status word that are 1 while the EEPROM is written."""
 
