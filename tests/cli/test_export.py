@@ -67,6 +67,13 @@ def test_csv_has_a_row_for_each_cycle_with_unit_and_scale_in_its_heading(
     assert (table[-1][RFR], table[-1][LCR]) == ("", "")
 
 
+def test_standard_output_has_the_same_rows_and_nothing_else(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "values.csv"
+    run(0, "export", line, "rfr", "-d", "1", "--out", path)
+    printed = run(0, "export", line, "rfr", "-d", "1", "--out", "-")
+    assert printed.splitlines() == path.read_text("utf-8").splitlines()
+
+
 def test_time_without_readings_is_an_empty_row(line: str, tmp_path: Path) -> None:
     path = tmp_path / "values.csv"
     run(0, "export", line, "RFR", "LCR", "-d", "1", "--out", path)
@@ -160,6 +167,8 @@ REFUSED = {
     "raw values": (("LINE", "LCR", "--raw", "--out", "x.csv"), "--raw requires --out FILE.pcapng"),
     "existing file": (("LINE", "LCR", "--out", "text"), "already exists"),
     "existing frames": (("LINE", "--out", "old.pcapng"), "already exists"),
+    "split output": (("LINE", "LCR", "--split", "day", "--out", "-"), "require --out FILE"),
+    "JSON output": (("LINE", "LCR", "--json", "--out", "-"), "require --out FILE"),
     "no folder": (("LINE", "LCR", "--out", "none/x.csv"), "cannot be written"),
     "no folder for frames": (("LINE", "--out", "none/x.pcapng"), "cannot be written"),
 }

@@ -98,6 +98,7 @@ def test_ctrl_c_ends_the_recording_with_a_whole_file(tmp_path: Path) -> None:
         (("RFR", "--out", "there.sqlite"), "there.sqlite already exists"),
         (("RFR", "--out", "new.sqlite", "--trigger", "faults"), "'faults' is not a trigger"),
         (("RFR", "--out", "new.sqlite", "--count", "1"), "--count requires --trigger"),
+        (("RFR", "--out", "-"), "it needs a FILE"),
         (("XYZQ", "--out", "new.sqlite"), "no parameter 'XYZQ'"),
         (("RFR", "--out", "none/new.sqlite/x"), "none"),
     ],

@@ -25,6 +25,7 @@ from ..shared.output import print_json
 from ..shared.registration import command
 from ..shared.rows import Column
 from ..shared.say import say
+from ..shared.standard_streams import STANDARD
 from ..shared.times import both_times, time_typed
 
 if TYPE_CHECKING:
@@ -85,7 +86,7 @@ class ExportOptions:
     required=True,
     type=click.Path(dir_okay=False, path_type=Path),
     metavar="FILE",
-    help="Write FILE.csv with values, or FILE.pcapng with frames.",
+    help="Write FILE.csv (- for output) or FILE.pcapng with frames.",
 )
 @click.option(
     "--from", "begin", callback=time_typed, metavar="TIME", help="Export from this time on."
@@ -128,6 +129,8 @@ def export(
         raise click.UsageError("--from must be before --to.")
     if as_frames and (codes or split):
         raise click.UsageError("CODEs and --split are for CSV files.")
+    if path == STANDARD and (split or as_json):
+        raise click.UsageError("--split and --json require --out FILE.")
     if raw and not as_frames:
         raise click.UsageError("--raw requires --out FILE.pcapng.")
     record = _recorded(source)
@@ -139,7 +142,7 @@ def export(
         return
     for text in wish.messages:
         say(f"drivepanel: {text}", err=True)
-    for item in wish.files:
+    for item in wish.files if path != STANDARD else ():
         say(counted(item.count, *(_WROTE_FRAMES if as_frames else _WROTE_ROWS), file=item.file))
 
 

@@ -34,6 +34,7 @@ from ..shared.options import (
 from ..shared.output import iso_time, print_json
 from ..shared.registration import ON_LINE, command
 from ..shared.say import say
+from ..shared.standard_streams import STANDARD
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import Parameter
@@ -45,6 +46,10 @@ if TYPE_CHECKING:
 
 WRITTEN_AGAIN = 0.5
 """Seconds from one write to the file to the next."""
+NOT_TO_OUTPUT = (
+    "A recording is a database: it needs a FILE. To print its values as CSV afterward, run:"
+    " drivepanel export FILE --out -"
+)
 LONGEST_AROUND = 3600.0
 """Most seconds before and after a trigger."""
 
@@ -206,6 +211,8 @@ def record(
     changed command word, a time of day, or a value that passes a level. The second number of a
     level is the value at which it can fire again: LCR>9,8.
     """
+    if path == STANDARD:
+        raise click.UsageError(NOT_TO_OUTPUT)
     if path.exists() and not force:
         raise Failure(f"{path} already exists. Choose another name or use --force.", USAGE)
     if count is not None and not triggers:

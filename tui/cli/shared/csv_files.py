@@ -6,6 +6,7 @@ import csv
 import io
 import os
 import re
+import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from datetime import date, datetime
@@ -17,6 +18,7 @@ import click
 from tui.drive.plain import plain_cells
 
 from .errors import USAGE, Failure
+from .standard_streams import STANDARD
 
 _SIZE = re.compile(r"(\d{1,9}(?:\.\d{1,9})?)\s*(k|M|G)i?B?", re.IGNORECASE)
 _FACTORS = {"k": 1_000, "m": 1_000_000, "g": 1_000_000_000}
@@ -42,7 +44,7 @@ def refuse_unasked(path: Path, *, append: bool, force: bool) -> None:
 
 
 class CsvFile:
-    """Rows in a CSV file, each flushed to the file as it is written.
+    """Rows in a CSV file or on standard output, each flushed as it is written.
 
     Raises Failure if the file exists without --append or --force, if its columns differ, or if it
     cannot be written.
@@ -62,7 +64,7 @@ class CsvFile:
         """Rows written by this command."""
         self._titles = plain_cells(titles)
         self._rotate = rotate
-        refuse_unasked(path, append=append, force=force)
+        refuse_unasked(path, append=append, force=force or path == STANDARD)
         self._day = date.today()
         self._file = self._opened(append=append)
 
@@ -81,7 +83,10 @@ class CsvFile:
             raise self._trouble(error) from error
 
     def _begun(self) -> TextIO:
-        file = self.path.open("w", newline="", encoding="utf-8")
+        if self.path == STANDARD:
+            file = sys.stdout
+        else:
+            file = self.path.open("w", newline="", encoding="utf-8")
         try:
             csv.writer(file).writerow(plain_cells(self._titles))
             file.flush()
@@ -143,8 +148,9 @@ class CsvFile:
 
     def close(self) -> None:
         """Close the file; a full disk was reported at the time of writing."""
-        with suppress(OSError):
-            self._file.close()
+        if self.path != STANDARD:
+            with suppress(OSError):
+                self._file.close()
 
 
 def _ends_with_a_line(path: Path) -> bool:
