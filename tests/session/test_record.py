@@ -239,6 +239,61 @@ def _size(path: Path) -> int:
     return wal.stat().st_size if wal.exists() else 0
 
 
+def on_the_disk(folder: Path, base: bytes, log: bytes) -> list[int | None]:
+    """The words that the next program finds after a power cut that left these bytes."""
+    path = folder / "cut.sqlite"
+    path.write_bytes(base)
+    path.with_name("cut.sqlite-wal").write_bytes(log)
+    RecordFile(path, "serial:x", "next").close()
+    with closing(sqlite3.connect(path)) as opened_again:
+        assert opened_again.execute("PRAGMA integrity_check").fetchone() == ("ok",)
+    found = [item.word for item in words_in(path)]
+    path.unlink()
+    return found
+
+
+def test_power_cut_keeps_what_was_flushed_wherever_it_cuts(folder: Path) -> None:
+    path = folder / "a.sqlite"
+    file = RecordFile(path, "serial:x", "test")
+    file.write([row_of(number, mono=number) for number in range(50)], ())
+    file.flush()
+    before = path.read_bytes()
+    for number in range(50, 90):
+        file.write([row_of(number, mono=number)], ())
+    log = path.with_name("a.sqlite-wal").read_bytes()
+    assert path.read_bytes() == before
+    cuts = [log[:size] for size in range(0, len(log) + 1, len(log) // 12)]
+    torn = [log[:at] + bytes(4096) + log[at + 4096 :] for at in (0, len(log) // 2)]
+    for left in (*cuts, *torn):
+        found = on_the_disk(folder, before, left)
+        assert found == list(range(len(found)))
+        assert 50 <= len(found) <= 90
+    file.flush()
+    after = path.read_bytes()
+    pages = range(0, len(after), 4096)
+    for begin in (0, 1):  # half of the pages had been flushed
+        mixed = [(after if at // 4096 % 2 == begin else before)[at : at + 4096] for at in pages]
+        whole = [page.ljust(4096, b"\0") for page in mixed]
+        assert on_the_disk(folder, b"".join(whole), log) == list(range(90))
+    file.close()
+
+
+def test_recorder_flushes_in_time_for_a_power_cut(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert recorder.FLUSHED_EVERY + recorder.WRITTEN_EVERY < 30
+    monkeypatch.setattr(recorder, "FLUSHED_EVERY", 0.0)
+    record = opened(folder)
+    record.note(read_now(7))
+
+    def flushed() -> bool:
+        bases = [path.read_bytes() for path in files(folder)]
+        return any(bases) and on_the_disk(tmp_path, bases[0], b"") == [7]
+
+    wait_until(flushed, "the row is on the disk without the log")
+    assert record.close(60)
+
+
 def test_record_is_read_while_it_is_written(folder: Path) -> None:
     record = opened(folder)
     record.note(read_of(3))
