@@ -310,3 +310,23 @@ def test_frames_before_the_time_are_those_of_the_wire(tmp_path: Path) -> None:
             ("out", "010300640001"),
             ("in", "010302000a"),
         ]
+
+
+@pytest.mark.parametrize("at", [500.0, 501.0, 20.0, 900.0, 3.0])
+def test_record_that_is_opened_again_shows_what_a_first_opening_shows(
+    at: float, tmp_path: Path
+) -> None:
+    rows = [row(1, (7,), address=200), row(500.005, (9,), address=300)]
+    rows += [row(second, (second,)) for second in range(1, 1000, 2)]
+    path = record(tmp_path, *rows)
+    for before in (700.0, 500.0, 10.0):  # one is on its way at 500 s
+        with replayed(path, before) as line:
+            words(line)
+    with replayed(path, at) as line:
+        assert words(line) == ((int(at) - 1) // 2 * 2 + 1,)
+        assert words(line, 200) == (7,)
+        if at > 500:
+            assert words(line, 300) == (9,)
+        else:
+            with pytest.raises(NotRecorded):
+                words(line, 300)

@@ -27,7 +27,7 @@ EXACT_LEAD = 60.0
 """Seconds before the time of a replay that pass as they were."""
 MONITORED_IN_LEAD = 4
 """Drives whose curves begin before the time of a replay, if none is open."""
-LEAD_TAKES, EXACT_TAKES = 0.5, 1.5
+LEAD_TAKES, EXACT_TAKES = 0.25, 1.5
 """Seconds of processor time for both; a line with many drives then has gaps in its curves."""
 LEAD_SLEEP = 5.0
 """Seconds of each sleep in those before; more with many drives."""

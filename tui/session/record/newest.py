@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
+from dataclasses import dataclass, field
+from functools import lru_cache, partial
 from itertools import pairwise
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -45,6 +47,10 @@ SOUGHT_AGAIN = 1_000_000
 """Microseconds after which the end of a file is read again: it may still be written."""
 REPEATED_WITHIN = 2_000_000
 """Microseconds within which a repeated request replaces the failed one before it."""
+LONGEST_EXCHANGE = 60_000_000
+"""Microseconds in which any exchange ends."""
+MOST_KNOWN = 20
+"""Times of a record whose replies are kept, of each device."""
 _NEVER = 1 << 62
 _REPLY = "utc, utc + took, id, function, address, registers, quality, words, received, repeat"
 _REDUCED = "utc, utc + took, id, function, address, registers, good, words"
@@ -97,12 +103,29 @@ class RecordedReply(NamedTuple):
         return WrongReply(*place, detail, self.received or b"")
 
 
+@dataclass(slots=True)
+class _KnownRecord:
+    """Replies that were read before: a replay opens its record again for another time."""
+
+    newest: dict[int, list[tuple[int, list[RecordedReply]]]] = field(default_factory=dict)
+    """By device, times and the newest replies then; the next time reads on from there."""
+    identified: dict[tuple[int, int], IdentificationObjects | None] = field(default_factory=dict)
+    """By device and function."""
+
+
+@lru_cache(maxsize=1)
+def _known_record(files: tuple[tuple[Path, int], ...], jumps: int) -> _KnownRecord:
+    return _KnownRecord()
+
+
 class ReplayReader(RecordReader):
     """The queries of a replay; for any thread that holds the lock of its line."""
 
     def __init__(self, *paths: Path) -> None:
         """Open the files of a line, the oldest first. Raises RecordDamaged, sqlite3.Error."""
         super().__init__(*paths, any_thread=True)
+        jumps = len(self.events_of(("clock",)))  # each may move the times before it
+        self._known = _known_record(tuple((path, path.stat().st_ino) for path in paths), jumps)
 
     def devices(self) -> tuple[int, ...]:
         """Return the devices that have answered."""
@@ -141,13 +164,26 @@ class ReplayReader(RecordReader):
 
     def newest(self, device: int, until: int) -> list[RecordedReply]:
         """Return the last result of each read that had ended by a time."""
-        form = "SELECT {}, max(utc) FROM {} WHERE device = ? AND utc <= ? AND utc + took <= ?"
-        grouped = " AND function IN (3, 4) GROUP BY function, address, registers"
-        where = device, until, until
-        rows = self._base.execute(form.format(_REPLY, "reply") + grouped, where).fetchall()
-        old = self._base.execute(form.format(_REDUCED, "reduced") + grouped, where).fetchall()
-        found = [_reply_in(row) for row in rows]
-        return found + [_reduced_in(row) for row in old]
+        known = self._known.newest.setdefault(device, [])
+        begin, before = max(
+            (item for item in known if item[0] <= until), key=itemgetter(0), default=(-_NEVER, [])
+        )
+        form = (
+            "SELECT {}, max(utc) FROM {} WHERE device = ? AND utc > ? AND utc <= ?"
+            " AND utc + took <= ? AND function IN (3, 4) GROUP BY function, address, registers"
+        )
+        where = device, begin - LONGEST_EXCHANGE, until, until
+        rows = self._base.execute(form.format(_REPLY, "reply"), where).fetchall()
+        old = self._base.execute(form.format(_REDUCED, "reduced"), where).fetchall()
+        later = [*map(_reply_in, rows), *map(_reduced_in, old)]
+        newest = {
+            (reply.function, reply.address, reply.registers, reply.reduced): reply
+            for reply in (*before, *later)
+        }
+        found = list(newest.values())
+        known.append((until, found))
+        del known[:-MOST_KNOWN]
+        return found
 
     def following(self, table: str, device: int, last: tuple[int, int]) -> list[Any]:
         """Return the next rows of a device after a time and a row."""
@@ -173,6 +209,12 @@ class ReplayReader(RecordReader):
 
     def identification(self, device: int, function: int) -> IdentificationObjects | None:
         """Return what a device reported by function 43 or 17; None if that is not recorded."""
+        known = self._known.identified
+        if (device, function) not in known:
+            known[device, function] = self._identification(device, function)
+        return known[device, function]
+
+    def _identification(self, device: int, function: int) -> IdentificationObjects | None:
         rows = self._base.execute(
             f"SELECT sent, received FROM reply WHERE device = ? AND quality = {GOOD}"
             " AND function = ? ORDER BY utc, id",
