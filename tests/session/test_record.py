@@ -321,7 +321,8 @@ def test_each_day_has_its_own_file(folder: Path) -> None:
 
 def test_clock_that_jumps_both_ways_is_stored_as_it_was(folder: Path) -> None:
     walls = [5 * A_DAY + 10.0, 5 * A_DAY + HOUR, 5 * A_DAY + 11.0]
-    record = opened(folder)
+    reported: list[str] = []
+    record = opened(folder, report=reported.append)
     for at, wall in enumerate(walls):
         record.note(read_of(at, mono=at, wall=wall))
     assert record.close(60)
@@ -336,6 +337,7 @@ def test_clock_that_jumps_both_ways_is_stored_as_it_was(folder: Path) -> None:
         "The computer's clock jumped by +3589.000 s.",
         "The computer's clock jumped by -3590.000 s.",
     ]
+    assert reported == jumps
 
 
 def test_each_file_begins_with_the_profiles_of_its_drives(folder: Path) -> None:

@@ -92,7 +92,7 @@ class LineRecorder:
         `is_on` is called in the recorder's thread: it may read a file.
 
         `report` gets texts for people, in the recorder's thread: once when nothing can be recorded,
-        and once when it can be again.
+        once when it can be again, and for each jump of the computer's clock.
         """
         self._folder, self._line, self._name, self._program = folder, line, name, program
         self._name_of = name_of
@@ -255,6 +255,7 @@ class LineRecorder:
             if before is not None and abs(offset - before) > CLOCK_JUMP:
                 text = f"The computer's clock jumped by {(offset - before) / 1e6:+.3f} s."
                 found.append(EventRow(row.utc, row.mono, None, "clock", text))
+                self._tell(text)
             found.append(row)
         return found
 
