@@ -1,4 +1,4 @@
-"""Keys and seconds of twelve everyday tasks, driven in a terminal as a person would.
+"""Keys and seconds of fourteen everyday tasks, driven in a terminal as a person would.
 
     python -m benchmarks.keys [--panel FOLDER] [--before]
 
@@ -46,6 +46,27 @@ class Task:
     now: Sequence[Step]
     before: Sequence[Step]
     prepare: Callable[[SimulatedDrive], None] = lambda _drive: None
+
+
+STEPS = """[startup]
+profile = "atv71"
+
+[[steps]]
+step = "Preparation"
+kind = "record"
+from_profile = "Preparation"
+fields = [{ name = "Preparation done", kind = "tick" }, { name = "Name" }]
+
+[[steps]]
+step = "Direction"
+kind = "direction"
+text = "Run briefly."
+source = "benchmark"
+confidence = "practice"
+hz = [5.0]
+reverse = "PHR"
+"""
+"""A start-up of two steps, so that none is reached by Tab only."""
 
 
 def typed(text: str) -> list[Step]:
@@ -105,6 +126,19 @@ TASKS = (
     ),
     Task("who commands it", [("6", "Commanded by")], [("2", "State"), ("c", "Control source")]),
     Task("the frames on the line", [("7", "Frames")], [("2", "State"), ("l", "Frames")]),
+    Task(
+        "tick and sign a step of the start-up",
+        [("B", "Preparation done"), ("Enter", "yes"), ("Enter", "Name"), *typed("Ada"),
+         ("Enter!", "Ada"), ("Enter", "1 done")],
+        [],
+    ),
+    Task(
+        "check the direction in the start-up",
+        [("Enter", "press a to arm"), ARM, ("r", "RUN FORWARD"), *typed("5"),
+         ("Enter!", "at reference"), ("Space", "STOPPED"), ("B", "Run the motor"),
+         ("Enter", "5.0 Hz"), ("Enter", "● The motor turned"), ("Enter", "2 done")],
+        [],
+    ),
     Task("leave", [("q", "Leave|$"), ("y!", "")], [("q", "Leave|$"), ("y", "")]),
 )  # fmt: skip
 
@@ -140,7 +174,14 @@ def main() -> None:
     arguments = parser.parse_args()
     found: dict[str, dict[str, float]] = {}
     with tempfile.TemporaryDirectory() as folder, Simulation([DriveSpec("atv71", 1)]) as simulation:
-        os.environ |= {"DRIVEPANEL_STATE": folder, "PYTHONPATH": str(arguments.panel.resolve())}
+        os.environ |= {
+            "DRIVEPANEL_STATE": folder,
+            "DRIVEPANEL_CONFIG": folder,
+            "PYTHONPATH": str(arguments.panel.resolve()),
+        }
+        own = Path(folder) / "profiles" / "startup" / "atv71.toml"
+        own.parent.mkdir(parents=True)
+        own.write_text(STEPS, "utf-8")
         line = f"serial:{simulation.serve_pty()},19200,8N1"
         terminal = Terminal(("tmux", "-S", f"{folder}/tmux", "-f", os.devnull))
         command = f"cd {folder} && exec {sys.executable} -m tui {line}"
@@ -152,6 +193,8 @@ def main() -> None:
             time.sleep(1.0)
             for task in TASKS:
                 steps = task.before if arguments.before else task.now
+                if not steps:
+                    continue  # version 0.1 had no such function
                 task.prepare(simulation.drive(1))
                 time.sleep(1.2)
                 begun = time.monotonic()

@@ -216,7 +216,10 @@ def test_nameplate_that_differs_prevents_done() -> None:
     made.enter("INV", "8.0")
     reported = facts(made, {"INV": 75}, identity="ATV71HU22M3")
     assert "the drive reports ATV71HU22M3" in made.finish(reported)
-    same = reported._replace(identity="ATV71HU15M3")
+    same = reported._replace(identity="ATV71HU15M3 ATV71HU15M3, 1.5 kW")
+    made.enter(PLATE_REFERENCE, "ATV71")
+    assert "the drive reports" in made.finish(same)
+    made.enter(PLATE_REFERENCE, "atv71 hu15m3 z")
     assert "the nameplate says 8.0, the drive has 7.5 A" in made.finish(same)
     made.enter("INV", "7,5")
     assert made.finish(same) == ""
@@ -279,14 +282,15 @@ def test_other_drive_at_the_address_has_its_own_progress() -> None:
 def test_damaged_progress_is_kept_aside() -> None:
     made = go_to(begun(), "Ramps")
     file = progress_file(made.session)
-    for damaged in ("{", json.dumps({"begun": 1})):
+    times = ({"begun": 1}, {"begun": "x", "drive": ""}, {"begun": "", "drive": ""})
+    for damaged in ("{", *map(json.dumps, times)):
         file.write_text(damaged, "utf-8")
         again = begun()
         assert "damaged" in again.notice
         assert again.index == 0
         again.go(3)
     assert sorted(path.suffix for path in file.parent.iterdir()) == [
-        ".damaged", ".damaged2", ".json",
+        ".damaged", ".damaged2", ".damaged3", ".damaged4", ".json",
     ]  # fmt: skip
     assert (file.with_suffix(".damaged")).read_text("utf-8") == "{"
 
@@ -348,7 +352,7 @@ def test_run_speed_and_stop_are_found_in_the_trend() -> None:
     assert run is not None
     assert run.time == 6
     assert steady is not None
-    assert steady.amperes == 2
+    assert steady.current == 2
     assert steady.end == 5
     assert stop is not None
     assert (stop.end, stop.hertz, stop.seconds) == (7, 10.2, 2)

@@ -175,6 +175,8 @@ OVER = {
     "faults-none": ("armed", ["5"]),
     "save": ("tripped", ["5", "ctrl+s"]),
     "leave-running": ("done", ["q"]),
+    "start-up": ("armed", ["B"]),
+    "start-up-ramps": ("armed", ["B", *["tab"] * 14, "down"]),
     "wiring": ("armed", ["I"]),
     "wiring-pins": ("armed", ["I", "tab", "tab"]),
 }
@@ -232,7 +234,9 @@ def shown_over(
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(monitor)
         await pilot.pause()
-        await pilot.press(*keys)
+        await pilot.press(*keys[:1])
+        await app.workers.wait_for_complete()  # of what a screen reads before keys do anything
+        await pilot.press(*keys[1:])
         await app.workers.wait_for_complete()
         await pilot.pause()
         await pilot.pause()

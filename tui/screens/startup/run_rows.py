@@ -132,13 +132,18 @@ class RunRows(PanelScreen):
         return self.session.profile.quantity("output_frequency") is None
 
     def _speed_text(self, steady: SteadyRun, rated: str) -> str:
-        """Describe a speed with its current, and the rated current if it is known now."""
-        amperes = "-----" if steady.amperes is None else f"{steady.amperes:.1f}"
+        """Describe a speed with its current, and the rated current if it is known now.
+
+        The current has the unit of the trend: % on a family that reports it so.
+        """
+        measured = self.session.profile.quantity("motor_current")
+        unit = measured.unit if measured is not None else ""
+        current = "-----" if steady.current is None else f"{steady.current:.1f} {unit}"
         reading = self.aged(self.app.clock.monotonic()).get(rated)
         number = reading.current_number if reading is not None else None
-        if number is None:
-            return f"{steady.hertz:.1f} Hz, {amperes} A"
-        return f"{steady.hertz:.1f} Hz, {amperes} A; rated {number:.1f} A"
+        if reading is None or number is None:
+            return f"{steady.hertz:.1f} Hz, {current}"
+        return f"{steady.hertz:.1f} Hz, {current}; rated {number:.1f} {reading.parameter.unit}"
 
     def _go_and_run(self, row: StepRow, hertz: str) -> None:
         what = f"At {row.key}" if row.kind == "speed" else row.key.capitalize()
@@ -156,6 +161,7 @@ class RunRows(PanelScreen):
             return
         self._enter(row, TURNED, row.key)
         if row.key == AS_REQUIRED:
+            start_up.row = [item.kind for item in start_up.rows].index("done")
             return
         text = WRONG_WAY if row.key == OTHER_WAY else NOT_TURNED
         start_up.note_deficiency(f"the motor {text}")

@@ -109,9 +109,7 @@ class StartUpScreen(RowKeys):
             codes = [*codes, *model_codes(profile)]
         wanted = [c for code in codes for c in (code, *depends_on(profile[code]))]
         try:
-            found = (
-                await self.console.read(dict.fromkeys(wanted), again=not whole) if wanted else {}
-            )
+            found = await self.console.read(dict.fromkeys(wanted), again=True) if wanted else {}
         except LineError:
             start_up.changes.lost()
         else:

@@ -37,7 +37,7 @@ STEP_SIGNS: Mapping[str, tuple[str, Style]] = {
     "changed": ("◆", ALARM),
 }
 """Sign of a step by its state; `changed` if a setting changed after it was done."""
-STEPS_WIDTH, RESULT_WIDTH = 23, 18
+STEPS_WIDTH, RESULT_WIDTH = 24, 18
 """Columns of the steps; columns of each one's result on a wide screen."""
 RESULTS_FROM = 110
 LABEL_WIDTH = 26
@@ -117,8 +117,8 @@ def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
         here = number == at + 1
         text = Text(" ▸" if here else "  ", ATTENTION, no_wrap=True)
         text.append(sign, style)
-        name = cut(plain(step.step), STEPS_WIDTH - 6)
-        text.append(f"{number:>2} {name}", STRONG if here else PLAIN)
+        name = cut(plain(step.step), STEPS_WIDTH - 7)
+        text.append(f" {number:>2} {name}", STRONG if here else PLAIN)
         if width > STEPS_WIDTH:
             text.append(f" {cut(_result(view, step), RESULT_WIDTH - 1)}", FAINT)
         lines.append(text)
@@ -146,10 +146,12 @@ def _step(view: StartUpView, width: int, rows: int) -> list[Text]:
     top += [Text(line, PLAIN) for line in wrapped(plain(step.text), width, 3)]
     note = [Text(line, FAINT) for line in wrapped(plain(step.note), width, 6)]
     source = f"Source: {step_source(view.profile, step)}"
-    below = [*note, *(Text(line, FAINT) for line in wrapped(plain(source), width, 2))]
+    below = [*note, *(Text(line, FAINT) for line in wrapped(plain(source), width, 3))]
     if record.past:
         below.append(Text(cut_at_word(f"Before: {plain(record.past[-1])}", width), FAINT))
     body = [_row(view, row, width, number == start_up.row) for number, row in _numbered(view)]
+    if len(top) + len(body) + len(below) + 2 <= rows:
+        body = [Text(""), *body, Text("")]
     # the rows are never cut off: first the note goes, then the rows scroll with the cursor
     room = max(3, rows - len(top))
     if len(body) > room:

@@ -24,7 +24,8 @@ class SteadyRun(NamedTuple):
 
     end: float
     hertz: float
-    amperes: float | None
+    current: float | None
+    """In the unit of the trend."""
 
 
 class SeenStop(NamedTuple):
@@ -77,9 +78,9 @@ def last_steady(points: Sequence[TrendPoint], hertz: float, since: float) -> Ste
         return None
     # the ramp to the speed ends within STEADY_WITHIN of it: its current does not count
     held = [point for point in held if held[0].time - point.time <= STEADY_SECONDS]
-    amperes = [value for point in held if (value := point.values[1]) is not None]
+    currents = [value for point in held if (value := point.values[1]) is not None]
     mean = sum(_hertz(point) or 0.0 for point in held) / len(held)
-    return SteadyRun(held[0].time, mean, sum(amperes) / len(amperes) if amperes else None)
+    return SteadyRun(held[0].time, mean, sum(currents) / len(currents) if currents else None)
 
 
 def _lasted(held: Sequence[TrendPoint]) -> bool:

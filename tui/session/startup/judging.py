@@ -46,6 +46,8 @@ class StepRow(NamedTuple):
 
 ROWS_WITH_ENTRY = {"plate", "reference", "run", "speed", "stop", "test", "backup", "retest"}
 _PLAIN_NUMBER = re.compile(r"[0-9]{1,9}([.,][0-9]{1,6})?")
+LEAST_REFERENCE = 8
+"""Fewest letters and digits of a reported reference that a nameplate may continue."""
 NEEDS_REST = {"direction", "stops", "speeds", "loss"}
 """Kinds of steps that run the motor: it must be at standstill before they are done."""
 MOTOR_RUNS = "Not done: the motor is not known to be at standstill. Stop it first."
@@ -143,7 +145,12 @@ def reference_fault(facts: StepFacts, typed: str) -> str:
 
     A drive that reports no reference cannot be compared.
     """
-    if not facts.identity or _letters(typed) in _letters(facts.identity):
+    known = [_letters(part) for part in re.split(r"[\s,]+", facts.identity)]
+    plate = _letters(typed)
+    # a nameplate may add a suffix to the reported reference; a part of it is another drive
+    if not facts.identity or any(
+        plate == part or (len(part) >= LEAST_REFERENCE and plate.startswith(part)) for part in known
+    ):
         return ""
     return f"The nameplate says {typed}, the drive reports {facts.identity}."
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from contextlib import suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
@@ -73,9 +74,13 @@ def read_progress(file: Path) -> StartUpProgress | None:
     if stored is None:
         return None
     try:
-        return msgspec.convert(stored, StartUpProgress)
-    except msgspec.ValidationError:
+        found = msgspec.convert(stored, StartUpProgress)
+        for text in (found.begun, *(record.time for record in found.steps.values())):
+            if text:
+                datetime.fromisoformat(text)
+    except (msgspec.ValidationError, ValueError):
         return None
+    return found if found.begun else None
 
 
 def set_damaged_aside(file: Path) -> Path | None:
