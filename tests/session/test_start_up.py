@@ -34,6 +34,7 @@ from tui.session.startup.progress import progress_file, read_progress
 from tui.session.startup.start_up import DEFICIENCY_STAYS, StartUp, open_start_up
 from tui.session.startup.steps import GuideField
 
+LINE = "sim:atv71@1"
 FAMILIES = ("atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca")
 
 
@@ -128,7 +129,7 @@ def test_file_of_the_user_replaces_the_packaged_one(tmp_path: Path) -> None:
 
 
 def begun() -> StartUp:
-    return open_start_up(DriveSession(FakeLine(), 1, library.load("atv71")))
+    return open_start_up(DriveSession(FakeLine(), 1, library.load("atv71")), LINE)
 
 
 def go_to(made: StartUp, step: str) -> StartUp:
@@ -273,15 +274,17 @@ def test_other_drive_at_the_address_has_its_own_progress() -> None:
         return DriveIdentity(1, "", reference, "", "", None, ())
 
     line, profile = FakeLine(), library.load("atv71")
-    files = {progress_file(DriveSession(line, 1, profile, identity(r))) for r in ("A", "B/../C")}
-    files.add(progress_file(DriveSession(line, 2, profile, identity("A"))))
+    files = {
+        progress_file(DriveSession(line, 1, profile, identity(r)), LINE) for r in ("A", "B/../C")
+    }
+    files.add(progress_file(DriveSession(line, 2, profile, identity("A")), LINE))
     assert len(files) == 3
     assert len({file.parent for file in files}) == 1
 
 
 def test_damaged_progress_is_kept_aside() -> None:
     made = go_to(begun(), "Ramps")
-    file = progress_file(made.session)
+    file = progress_file(made.session, LINE)
     times = ({"begun": 1}, {"begun": "x", "drive": ""}, {"begun": "", "drive": ""})
     for damaged in ("{", *map(json.dumps, times)):
         file.write_text(damaged, "utf-8")
@@ -306,7 +309,7 @@ def test_full_disk_is_reported_and_the_results_are_kept(monkeypatch: pytest.Monk
         go_to(made, "Insulation").enter("Name", "Ada")
         assert "NOT SAVED: No space left on device" in made.trouble
     made.enter("Instrument", "MIT430")
-    stored = read_progress(progress_file(made.session))
+    stored = read_progress(progress_file(made.session, LINE))
     assert made.trouble == ""
     assert stored is not None
     assert stored.steps["Insulation"].entries == {"Name": "Ada", "Instrument": "MIT430"}
@@ -317,7 +320,7 @@ def test_newer_result_of_another_program_is_kept() -> None:
     other = begun()
     go_to(other, "Interlocks").enter("Name", "Bob")
     made.enter("Name", "Ada")
-    stored = read_progress(progress_file(made.session))
+    stored = read_progress(progress_file(made.session, LINE))
     assert stored is not None
     assert stored.steps["Interlocks"].entries == {"Name": "Bob"}
     assert stored.steps["Insulation"].entries == {"Name": "Ada"}
@@ -325,11 +328,11 @@ def test_newer_result_of_another_program_is_kept() -> None:
 
 def test_report_has_each_result_and_former_deficiencies() -> None:
     made = go_to(begun(), "Insulation")
-    assert start_up_lines(made.session) == []
+    assert start_up_lines(made.session, LINE) == []
     record(made, **INSULATION)
     made.note_deficiency("wet cable")
     go_to(made, "Auto-tuning").skip("load is coupled")
-    text = "\n".join(start_up_lines(made.session))
+    text = "\n".join(start_up_lines(made.session, LINE))
     assert "Insulation: DEFICIENT: wet cable" in text
     assert "Auto-tuning: skipped: load is coupled" in text
 

@@ -101,7 +101,9 @@ def report(
     record = record_files(target.line_text)
     trends = report_trends(record, target.device, session.profile, entries, time.time())
     lines = _written_trends(trends, file, force=force)
-    text = text_of(session.profile, values, entries, lines, start_up_lines(session))
+    text = text_of(
+        session.profile, values, entries, lines, start_up_lines(session, target.line_text)
+    )
     write_down(file, text, force=force)
     messages = Messages(as_json=as_json or file == STANDARD)
     messages.tell(f"{file}: report on {session.profile.name} at address {target.device}")

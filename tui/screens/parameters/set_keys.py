@@ -146,7 +146,8 @@ class SetKeys(ParameterKeys):
         from tui.session.report_trends import linked, report_trend_lines, report_trends, trend_files
         from tui.session.startup.lines import start_up_lines
 
-        session, profile, device = self.session, self.session.profile, self.session.device
+        session, profile = self.session, self.session.profile
+        device, line = session.device, self.app.line_text
         recorder = self.app.opened.recorder if self.app.opened is not None else None
         now = self.app.clock.wall()
 
@@ -160,7 +161,7 @@ class SetKeys(ParameterKeys):
             for name, svg in drawn.values():
                 write_file(path.with_name(name), svg)
             lines = report_trend_lines(trends, linked(drawn))
-            return report_text(profile, values, entries, lines, start_up_lines(session))
+            return report_text(profile, values, entries, lines, start_up_lines(session, line))
 
         about = (
             "Identity, line, changed settings, control source, communication loss reaction, faults,"

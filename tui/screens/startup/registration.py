@@ -21,9 +21,9 @@ def create_start_up(console: DriveConsole) -> Screen[None]:
 
 def no_start_up(console: DriveConsole) -> str:
     """Return why a drive has no start-up; empty if it can have one."""
-    from tui.session.connect.line_key import is_replay
+    from tui.session.record.replay_line import ReplayLine
 
-    return "A replay has no start-up." if is_replay(console.session.line_text) else ""
+    return "A replay has no start-up." if isinstance(console.session.line, ReplayLine) else ""
 
 
 REGISTERED = (

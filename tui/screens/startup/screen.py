@@ -66,7 +66,7 @@ class StartUpScreen(RowKeys):
     async def _open(self, path: Path | None) -> None:
         """Open the family's steps, or those of a file; the disk may hang."""
         try:
-            opened = await asyncio.to_thread(open_start_up, self.session, path)
+            opened = await asyncio.to_thread(open_start_up, self.session, self.app.line_text, path)
         except ProfileError as error:
             self._fault = str(error)
             if path is not None:

@@ -40,7 +40,8 @@ STEP_SIGNS: Mapping[str, tuple[str, Style]] = {
 STEPS_WIDTH, RESULT_WIDTH = 24, 18
 """Columns of the steps; columns of each one's result on a wide screen."""
 RESULTS_FROM = 110
-LABEL_WIDTH = 26
+LABEL_WIDTH, VALUE_ROOM = 26, 14
+"""Columns of a usual label; least columns beside a longer one."""
 RESULT_LABELS = {
     "done": "Done: go to the next step",
     "deficient": "Deficiency ...",
@@ -221,7 +222,9 @@ def _row(view: StartUpView, row: StepRow, width: int, chosen: bool) -> Text:
         text.append_text(_parameter(view, row.key, width))
     else:
         entry = record.entries.get(row.key, "")
-        text.append(cut(_label(view, row), LABEL_WIDTH), PLAIN)
+        labels = [_label(view, other) for other in view.start_up.rows if other.field is not None]
+        longest = max([LABEL_WIDTH, *map(len, labels)])
+        text.append(cut(_label(view, row), min(longest, width - VALUE_ROOM)), PLAIN)
         if row.kind in ("save", "report"):
             pass
         elif entry:

@@ -8,9 +8,12 @@ from .progress import progress_file, read_progress
 RESULT_WORDS = {"open": "not done", "done": "done", "skipped": "skipped", "deficient": "DEFICIENT"}
 
 
-def start_up_lines(session: DriveSession) -> list[str]:
-    """Return the results of a drive's start-up as Markdown; empty if none is stored."""
-    progress = read_progress(progress_file(session))
+def start_up_lines(session: DriveSession, line: str) -> list[str]:
+    """Return the results of a drive's start-up as Markdown; empty if none is stored.
+
+    `line` is the line as typed.
+    """
+    progress = read_progress(progress_file(session, line))
     if progress is None or not progress.steps:
         return []
     lines = ["## Start-up", "", f"- Begun: {progress.begun}"]

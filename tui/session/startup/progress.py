@@ -11,7 +11,7 @@ from typing import Literal
 
 import msgspec
 
-from ..connect.line_key import line_key
+from ..connect.line_key import SIMULATED_PREFIX, line_key
 from ..drive import DriveSession
 from ..paths import state_folder
 from ..stored import store_json, stored_json
@@ -58,10 +58,14 @@ class StartUpProgress(msgspec.Struct, kw_only=True):
         return self.steps.get(step) or StepRecord()
 
 
-def progress_file(session: DriveSession) -> Path:
-    """Return the file of a drive: by line, address, family and reported identity."""
+def progress_file(session: DriveSession, typed: str) -> Path:
+    """Return the file of a drive: by line, address, family and reported identity.
+
+    `typed` is the line as it was opened: a simulated one has another port each time.
+    """
     identity = session.known_identity
-    line = line_key(session.line_text)
+    simulated = typed.strip().casefold().startswith(SIMULATED_PREFIX)
+    line = line_key(typed if simulated else session.line_text)
     parts = (line, str(session.device), session.profile.id, identity.reference, identity.name)
     digest = hashlib.sha256("\0".join(parts).encode("utf-8", "replace")).hexdigest()[:12]
     name = re.sub(r"[^A-Za-z0-9]+", "-", identity.reference or session.profile.id).strip("-")

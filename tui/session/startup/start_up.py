@@ -33,8 +33,8 @@ class StartUp:
     It is made and changed on one thread.
     """
 
-    def __init__(self, session: DriveSession, guide: Guide, own: str = "") -> None:
-        """`own` is the path of the steps, if a person has opened their file."""
+    def __init__(self, session: DriveSession, line: str, guide: Guide, own: str = "") -> None:
+        """`line` is as typed; `own` is the path of the steps if a person opened their file."""
         self.session = session
         self.guide = guide
         self.row = 0
@@ -44,7 +44,7 @@ class StartUp:
         self.notice = ""
         """A fact to report once, such as a damaged file."""
         self.changes = SettingChanges(session)
-        self._file = progress_file(session)
+        self._file = progress_file(session, line)
         self.progress = self._stored() or self._new()
         self.progress.guide = own
         self.resumed = bool(self.progress.saved)
@@ -207,13 +207,14 @@ class StartUp:
             self._save()
 
 
-def open_start_up(session: DriveSession, own: Path | None = None) -> StartUp:
-    """Begin or resume the start-up of a drive, with the steps of a person's `own` file if given.
+def open_start_up(session: DriveSession, line: str, own: Path | None = None) -> StartUp:
+    """Begin or resume the start-up of a drive on a line as typed.
 
-    A resumed one keeps its own file. Reads the disk. Raises ProfileError.
+    A person's `own` file of steps replaces that of the family, and is kept when it is resumed.
+    Reads the disk. Raises ProfileError.
     """
-    stored = read_progress(progress_file(session))
+    stored = read_progress(progress_file(session, line))
     path = own or (Path(stored.guide) if stored is not None and stored.guide else None)
     if path is not None:
-        return StartUp(session, read_guide(path, session.profile), str(path))
-    return StartUp(session, find_guide(session.profile))
+        return StartUp(session, line, read_guide(path, session.profile), str(path))
+    return StartUp(session, line, find_guide(session.profile))
