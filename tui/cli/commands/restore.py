@@ -75,6 +75,8 @@ ACROSS_QUANTITIES = (
     "The set is of another family: common quantities are carried over in their units."
 )
 ACROSS_TABLE = "The set is of a predecessor: settings that mean the same are carried over."
+NEWEST = "newest"
+"""FILE that stands for the newest backup of the drive at this address."""
 ALIKE = 3
 """If more settings than this are omitted for one reason, they are reported without their values."""
 CODES_NAMED = 12
@@ -120,6 +122,9 @@ def restore(
     With several -d, the set is restored to each drive in turn. If it fails on one drive, it is
     still restored to the others.
 
+    If FILE is `newest`, --dry-run shows the newest backup of the drive or of its predecessor at
+    this address, and how rating and firmware compare. It then names the next commands.
+
     --dry-run shows what would be written, what is omitted, and why. To resume an interrupted
     restore, repeat the command: it reads the drive, and writes what is missing.
     """
@@ -129,7 +134,11 @@ def restore(
     from ..shared.output import drive_fields
 
     _either(dry_run=dry_run, arm=arm)
-    values = set_in(file)
+    newest = str(file) == NEWEST and not file.exists()
+    if newest and not dry_run:
+        text = f"{NEWEST} needs --dry-run: look at the differences first. It names the file."
+        raise click.UsageError(text)
+    chosen = None if newest else set_in(file)
     telling = ResultTelling(Messages(as_json=as_json))
 
     async def restore_drive(opened: OpenLine, target: Target) -> tuple[RestoreDocument, int]:
@@ -137,8 +146,14 @@ def restore(
         telling = ResultTelling(Messages(as_json=as_json))
         session = await connect_drive(opened, target)
         options = Options(line_settings, rating, codes_of(session, confirmed), rounded)
-        if dry_run:
-            found, status = await _tell(session, values, options, telling.messages)
+        values, messages = chosen, telling.messages
+        if values is None:
+            from ..running.predecessor import chosen_set
+
+            path, values = await chosen_set(opened, session)
+            found, status = await _tell(session, values, options, messages, line_text, path)
+        elif dry_run:
+            found, status = await _tell(session, values, options, messages)
         else:
             found, status = await _restore(session, values, options, telling, save=save)
         document = RestoreDocument(
@@ -166,14 +181,30 @@ def _either(*, dry_run: bool, arm: bool) -> None:
 
 
 async def _tell(
-    session: DriveSession, values: ParameterSet, options: Options, messages: Messages
+    session: DriveSession,
+    values: ParameterSet,
+    options: Options,
+    messages: Messages,
+    line_text: str = "",
+    newest: Path | None = None,
 ) -> tuple[_Restored, int]:
+    """Report the plan; for the `newest` backup also its drive, and the next commands."""
     from tui.drive.profile import library
-    from tui.session.settings.restore import plan_for
+    from tui.drive.settings.restore_planner import plan_restore
+    from tui.session.settings.restore import held_by
 
     source = library.load(values.head.profile)
-    plan = await plan_for(session, values, source, options, counter("Read"))
+    held = await held_by(session, counter("Read"))
+    plan = plan_restore(session.profile, held, values, source, options)
+    if newest is not None:
+        from ..running.predecessor import say_predecessor
+
+        say_predecessor(session, held, source, values, messages)
     say_plan(session, plan, messages)
+    if newest is not None:
+        from ..running.predecessor import say_next_commands
+
+        say_next_commands(line_text, session, newest, plan, messages)
     return _restored(plan), DONE
 
 

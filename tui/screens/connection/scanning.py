@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from textual import work
@@ -21,9 +22,11 @@ if TYPE_CHECKING:
     from tui.bus.link import Link
     from tui.session.connect.identify import DriveIdentity, ScanResult
     from tui.session.connect.search import Search
+    from tui.session.drive import DriveSession
 
 NONE_AT_ADDRESS = "No drive answered at address {} (2 attempts)."
 NONE_AT_ADDRESSES = "No drive answered at addresses {} (2 attempts)."
+COMPARE_WITH_BACKUP = "Press Ctrl+D on this drive to compare. Nothing is written."
 NO_SCAN_IN_REPLAY = "This is a replay: it has the drives of its record."
 AFTER_NO_ANSWER = (
     "Press N to diagnose, c to change the addresses, or s to scan again. Ctrl+P lists a scan at"
@@ -237,6 +240,8 @@ class Scanning(LineView):
             self.app.events.add(
                 ALARM_KIND, f"{session.contradiction} {WATCHED_ONLY}", session.device
             )
+        if console is not before and not guessed and not session.contradiction:
+            self.report_replacement(console.session)
         known = self.app.opened.known if self.app.opened else None
         if known is not None:
             reported = (identity, identity.device, "" if guessed else console.session.profile.id)
@@ -244,6 +249,15 @@ class Scanning(LineView):
             threading.Thread(
                 target=known.note, args=reported, name="known line", daemon=True
             ).start()
+
+    @work(group="replacement", exit_on_error=False)
+    async def report_replacement(self, session: DriveSession) -> None:
+        """Report a drive with factory settings if its newest backup has others; write nothing."""
+        from tui.session.settings.predecessor import predecessor_notice
+
+        with suppress(LineError, DriveError):  # it is only an offer
+            if text := await predecessor_notice(session):
+                self.app.events.add("told", f"{text} {COMPARE_WITH_BACKUP}", session.device)
 
     @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:

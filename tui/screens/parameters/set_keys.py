@@ -22,7 +22,6 @@ from tui.drive.settings.restore_plan import RestoreItem
 from tui.drive.settings.selection import Choice
 from tui.drive.settings.set_file import read_set
 from tui.drive.settings.writable import is_setting
-from tui.session.settings.backups import newest_backup
 from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
 
@@ -99,6 +98,7 @@ def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbou
 
 
 NO_BACKUP = "No backup of this drive on this line in this folder or in the backup folder."
+TEST_AFTERWARDS = "After writing, test the drive with drivepanel accept."
 SAVED_ALL = "Saved: {count} parameters, in {path}"
 SAVED_SOME = "Saved: {count} parameters, without {absent} that the drive does not report, in {path}"
 
@@ -252,11 +252,15 @@ class SetKeys(ParameterKeys):
         self.run_worker(self._compare_newest(), exclusive=True, group="sets")
 
     async def _compare_newest(self) -> None:
-        newest = await asyncio.to_thread(newest_backup, self.session)
+        from tui.session.settings.predecessor import predecessor_set
+
+        session = self.session
+        where = session.profile, session.line_text, session.device
+        newest = await asyncio.to_thread(predecessor_set, *where)
         if newest is None:
             self.note(NO_BACKUP, "Press Ctrl+O to choose a file.")
         else:
-            await self._compare(str(newest))
+            await self._compare(str(newest[0]))
 
     async def _compare(self, text: str) -> None:
         editor = self.editor
@@ -313,12 +317,27 @@ class SetKeys(ParameterKeys):
         if not editor.other:
             editor.other = {"": 0}
         writes, skips = plan.count("write"), plan.count("skip")
+        self._report_predecessor()
         self.note(
             difference_text(editor.other_label, writes, plan.count("equal"), skips),
             "Press i to stage." if writes else "",
         )
         self.listed.choose(Choice("differs"))
         self.clear_search()
+
+    def _report_predecessor(self) -> None:
+        """Add how rating and firmware compare, if the set is of another drive at this address."""
+        from tui.drive.profile import library
+        from tui.drive.settings.replacement import identity_lines, is_of_another_drive
+        from tui.session.read.upload import head_of
+
+        source, session = self.editor.source, self.session
+        now = head_of(session)
+        if source is not None and is_of_another_drive(now, source.head):
+            old = library.load(source.head.profile)
+            held = self.editor.values.raws
+            rows = identity_lines(session.profile, now, held, old, source)
+            self.note(" ".join((*rows, TEST_AFTERWARDS)))
 
     def action_stage_set(self) -> None:
         """Stage the differences of the set; nothing is written."""

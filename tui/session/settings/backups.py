@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tui.drive.errors import DriveError
+from tui.drive.settings.parameter_set import ParameterSet
 from tui.drive.settings.set_file import read_set
 
+from ..connect.line_key import line_key
 from ..paths import state_folder
 
 if TYPE_CHECKING:
@@ -33,15 +35,25 @@ def files_in(folders: Iterable[Path]) -> list[Path]:
     return sorted(found, key=lambda path: -found[path])[:FILES_LISTED]
 
 
-def newest_backup(session: DriveSession) -> Path | None:
-    """Return the newest parameter set of a drive in the folders of backups; reads their files.
+def newest_set(
+    families: Collection[str], line: str, device: int
+) -> tuple[Path, ParameterSet] | None:
+    """Return the newest set of these families at an address, with its file; reads files.
 
-    The file names the family, the line and the address, so it is not one of another machine.
+    The set names the line and the address, so it is not one of another machine.
     """
-    wanted = (session.profile.id, session.line_text, session.device)
+    key = line_key(line)
     for path in files_in([Path.cwd(), state_folder()]):
         with suppress(DriveError):
-            head = read_set(path, path.name).head
-            if (head.profile, head.line, head.device) == wanted:
-                return path
+            values = read_set(path, path.name)
+            head = values.head
+            known = head.profile in families and head.device == device and head.line
+            if known and line_key(head.line) == key:
+                return path, values
     return None
+
+
+def newest_backup(session: DriveSession) -> Path | None:
+    """Return the newest parameter set of a drive in the folders of backups; reads their files."""
+    found = newest_set([session.profile.id], session.line_text, session.device)
+    return found[0] if found is not None else None
