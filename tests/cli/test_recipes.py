@@ -44,7 +44,7 @@ def written(path: Path, profile: str = "atv312", **raws: int) -> None:
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    written(tmp_path / "pumps.toml", ACC=40, dEC=50, HSP=500, Add=9, Inr=1)
+    written(tmp_path / "pumps.toml", ACC=40, dEC=50, HSP=500, Add=9, Inr=1, nCr=99)
     written(tmp_path / "pump-4.toml", dEC=30)
     path = tmp_path / "hall2.toml"
     path.write_text(LIST, "utf-8")
@@ -65,8 +65,9 @@ def test_each_drive_is_compared_with_its_own_recipe(as_json: bool, file: Path) -
             assert [row["code"] for row in document["drives"][1]["rows"]] == ["HSP", "ACC"]
             return
         output = run(1, "compare", file, line)
-        assert "Drive 4: as its recipe of 5 settings." in output
+        assert "Drive 4: as its recipe of 4 settings." in output
         assert "Drive 5: differs in 2." in output
+        assert "belongs to the set of a drive: nCr." in output
         assert "Add" not in output, "the address belongs to the line"
         assert run(0, "compare", file, line, "-d", "4").startswith("Drive 4: as its recipe")
 
@@ -75,7 +76,7 @@ def test_drive_that_does_not_answer_hinders_no_other(file: Path) -> None:
     with tcp_line("atv312@5", "--set", "ACC=40", "--set", "HSP=500", "--any-settings") as line:
         done = ended(3, "compare", file, line)
     assert "Drive 4: not compared." in done.stdout
-    assert "Drive 5: as its recipe of 5 settings." in done.stdout
+    assert "Drive 5: as its recipe of 3 settings." in done.stdout
 
 
 FAULTS = {
@@ -106,3 +107,34 @@ def test_fault_of_a_recipe_is_reported_with_its_line(name: str, file: Path) -> N
 def test_options_that_do_not_fit_recipes_are_refused(file: Path) -> None:
     assert "omit -p" in refused(2, "compare", file, "sim:atv312", "-p", "atv312")
     assert "no recipe for device 9" in refused(2, "compare", file, "sim:atv312", "-d", "9")
+
+
+def test_recipes_are_restored_to_their_own_drives(file: Path) -> None:
+    text = file.read_text("utf-8").replace("format = 1", 'format = 1\nname = "Product A"')
+    file.write_text(text, "utf-8")
+    sets = ("4:ACC=40", "4:dEC=31", "5:dEC=77", "5:HSP=450")
+    options = [word for text in sets for word in ("--set", text)]
+    with tcp_line("atv312@4", "atv312@5", *options, "--any-settings") as line:
+        before = {device: held_words(line, device) for device in "45"}
+        shown = run(0, "restore", line, file, "--dry-run")
+        assert before == {device: held_words(line, device) for device in "45"}
+        assert "left out, of a drive: nCr" in shown
+        documents = json.loads(run(0, "restore", line, file, "--arm", "--json"))
+        written_codes = [[each["code"] for each in found["results"]] for found in documents]
+        assert written_codes == [["dEC"], ["HSP", "ACC"]]
+        assert run(0, "compare", file, line).startswith("Product A:")
+        after = {device: held_words(line, device) for device in "45"}
+    assert after["4"] == {**before["4"], "dEC": 30}
+    assert after["5"] == {**before["5"], "HSP": 500, "ACC": 40}, "dEC is ignored"
+
+
+def held_words(line: str, device: str) -> dict[str, int]:
+    """Settings of a drive that the recipes concern, and some that they must not touch."""
+    read = run(0, "read", line, "ACC", "dEC", "HSP", "nCr", "Add", "-d", device, "--json")
+    return {code: value["raw"] for code, value in json.loads(read)["values"].items()}
+
+
+def test_recipes_are_restored_to_chosen_drives_only(file: Path) -> None:
+    assert "no recipe for device 9" in refused(2, "restore", "sim:atv312", file, "-d", "9", "--arm")
+    words = ("restore", "sim:atv312", file, "--arm", "-p", "atv312")
+    assert "omit -p" in refused(2, *words)

@@ -49,6 +49,7 @@ from ..shared.sets import (
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edit
     from tui.drive.settings.parameter_set import ParameterSet
+    from tui.drive.settings.recipes import DriveRecipe
     from tui.drive.settings.restore_plan import Options, RestoreItem, RestorePlan
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
@@ -97,11 +98,7 @@ CODES_NAMED = 12
 @json_option
 @never_forced
 @profile_option
-@devices_option(
-    "Use the drive at this slave address; repeatable.",
-    default=(1,),
-    show_default=True,
-)
+@devices_option("Use the drive at this address; repeatable (default: 1, or all of a recipe file).")
 def restore(
     line_text: str,
     file: Path,
@@ -119,6 +116,8 @@ def restore(
 ) -> None:
     """Restore a parameter set to a drive: differences are written and read back.
 
+    If FILE is a file of recipes, each of its drives gets the set of its own recipe.
+
     With several -d, the set is restored to each drive in turn. If it fails on one drive, it is
     still restored to the others.
 
@@ -128,9 +127,11 @@ def restore(
     --dry-run shows what would be written, what is omitted, and why. To resume an interrupted
     restore, repeat the command: it reads the drive, and writes what is missing.
     """
+    from tui.drive.settings.recipes import is_recipe_file
     from tui.drive.settings.restore_plan import Options
 
     from ..documents.setting_documents import RestoreDocument
+    from ..running.recipe_comparison import recipes_in
     from ..shared.output import drive_fields
 
     _either(dry_run=dry_run, arm=arm)
@@ -138,15 +139,27 @@ def restore(
     if newest and not dry_run:
         text = f"{NEWEST} needs --dry-run: look at the differences first. It names the file."
         raise click.UsageError(text)
-    chosen = None if newest else set_in(file)
+    recipes: dict[int, DriveRecipe] = {}
+    if is_recipe_file(file):
+        if profile_id is not None:
+            raise click.UsageError("The profiles are in the file of recipes: omit -p.")
+        recipes = {recipe.device: recipe for recipe in recipes_in(file, devices)}
+    elif not devices:
+        devices = (1,)
+    chosen = None if newest or recipes else set_in(file)
     telling = ResultTelling(Messages(as_json=as_json))
 
     async def restore_drive(opened: OpenLine, target: Target) -> tuple[RestoreDocument, int]:
         nonlocal telling
         telling = ResultTelling(Messages(as_json=as_json))
+        recipe = recipes.get(target.device)
+        if recipe is not None:
+            target = target._replace(profile_id=recipe.profile.id)
         session = await connect_drive(opened, target)
         options = Options(line_settings, rating, codes_of(session, confirmed), rounded)
-        values, messages = chosen, telling.messages
+        values, messages = recipe.values if recipe else chosen, telling.messages
+        if recipe is not None and recipe.left:
+            messages.tell(f"left out, of a drive: {first_of(recipe.left, CODES_NAMED)}")
         if values is None:
             from ..running.predecessor import chosen_set
 
@@ -164,7 +177,8 @@ def restore(
         )
         return document, status
 
-    where = Target(line_text, devices[0], profile_id, others=devices[1:])
+    first, *others = devices or recipes
+    where = Target(line_text, first, profile_id, others=tuple(others))
     try:
         on_each_drive(where, restore_drive, as_json=as_json, read_only=read_only or dry_run)
     except KeyboardInterrupt:

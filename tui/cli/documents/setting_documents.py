@@ -81,6 +81,8 @@ class RecipeDriveField(DocumentPart):
     differs: int | None
     """Number that differ; null if the drive was not compared."""
     error: str | None
+    left: list[str]
+    """Codes in the set of the machine that belong to a drive, and do not count."""
     rows: list[ComparedSettingField]
 
 
@@ -89,6 +91,7 @@ class RecipesDocument(Document, kw_only=True):
 
     command: Literal["compare"] = "compare"
     file: str
+    name: str | None
     line: str
     equal: bool
     drives: list[RecipeDriveField]

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tui.drive.sentences import counted
+from tui.drive.sentences import counted, first_of
 
 from ..documents.setting_documents import RecipeDriveField, RecipesDocument
 from ..shared.errors import DIFFERENT, DONE, LINE_TROUBLE, USAGE, Failure
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from ..documents.parts import ComparedSettingField
 
 RowField = Callable[["ComparedRow"], "ComparedSettingField"]
+LEFT_TO_DRIVES = "   Not compared, because it belongs to the set of a drive: {codes}."
+CODES_LISTED = 12
 DIFFERS = ("Drive {device}: differs in 1.", "Drive {device}: differs in {count}.")
 
 
@@ -42,7 +44,7 @@ def compare_with_recipes(
 
     With `devices` only these. A drive that cannot be read hinders no other: the status is then 3.
     """
-    recipes = _recipes(file, devices)
+    recipes = recipes_in(file, devices)
 
     async def work(opened: OpenLine) -> list[tuple[RecipeDriveField, list[ComparedRow]]]:
         return [await _compared(opened, line, each, row_field, all_rows) for each in recipes]
@@ -51,8 +53,12 @@ def compare_with_recipes(
     if as_json:
         drives = [each for each, _ in found]
         equal = all(each.differs == 0 for each in drives)
-        print_json(RecipesDocument(file=str(file), line=line, equal=equal, drives=drives))
+        name = recipes[0].name or None
+        document = RecipesDocument(file=str(file), name=name, line=line, equal=equal, drives=drives)
+        print_json(document)
     else:
+        if recipes[0].name:
+            say(f"{recipes[0].name}:")
         for each, rows in found:
             _print(each, rows, format_)
     if any(each.error for each, _ in found):
@@ -60,7 +66,8 @@ def compare_with_recipes(
     return DIFFERENT if any(each.differs for each, _ in found) else DONE
 
 
-def _recipes(file: Path, devices: Sequence[int]) -> list[DriveRecipe]:
+def recipes_in(file: Path, devices: Sequence[int]) -> list[DriveRecipe]:
+    """Return the recipes of a file; with `devices` only these. Raises Failure or UsageError."""
     from tui.drive.errors import ProfileError
     from tui.drive.settings.recipes import read_recipes
 
@@ -94,6 +101,7 @@ async def _compared(
         settings=len(recipe.raws),
         differs=differs,
         error=error or None,
+        left=list(recipe.left),
         rows=[row_field(row) for row in rows],
     )
     return each, rows
@@ -108,5 +116,7 @@ def _print(each: RecipeDriveField, rows: list[ComparedRow], format_: TableFormat
         say(f"Drive {each.device}: as its recipe of {each.settings} settings.")
     else:
         say(counted(each.differs, *DIFFERS, device=each.device))
+    if each.left:
+        say(LEFT_TO_DRIVES.format(codes=first_of(each.left, CODES_LISTED)), indent=3)
     if rows:
         say(rows_text(rows, ("recipe", "drive"), format_).removesuffix("\n"), indent=3)

@@ -1,15 +1,16 @@
 """Recipes of a line: for each drive, the settings of the machine and those of the drive itself.
 
-Both are parameter sets. A value of the drive counts instead of the same one of the machine.
+Both are parameter sets. A value of the drive counts instead of the same one of the machine. Motor
+data, ratings and line settings count from the set of the drive only.
 """
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, TypeVar
 
 from msgspec import Meta
 
@@ -23,8 +24,11 @@ from ..shown import depends_on
 from ..small_file import read_small_text
 from .compare import ComparedRow, Side, compare_settings, side_of
 from .parameter_set import ParameterSet
+from .rating import rated
 from .set_file import read_set
-from .writable import CUTTING
+from .writable import CUTTING, line_setting
+
+T = TypeVar("T")
 
 _HEAD = re.compile(r"^\s*\[\[\s*recipes\s*\]\]", re.MULTILINE)
 
@@ -46,6 +50,8 @@ class RecipeList(Table, frozen=True, kw_only=True):
     """A recipe file."""
 
     format: Literal[1]
+    name: str = ""
+    """Name for a person, such as that of a product."""
     recipes: Annotated[list[Recipe], Meta(min_length=1, max_length=247)]
 
 
@@ -55,8 +61,17 @@ class DriveRecipe:
 
     device: int
     profile: Profile
-    raws: Mapping[str, int]
-    ignore: frozenset[str]
+    values: ParameterSet
+    """Merged set of machine and drive, without the codes that may differ."""
+    left: tuple[str, ...] = ()
+    """Codes of motor data and ratings in the set of the machine; they do not count."""
+    name: str = ""
+    """Name of the file's recipes."""
+
+    @property
+    def raws(self) -> Mapping[str, int]:
+        """Raw values by code."""
+        return self.values.raws
 
     def differences(self, values: ParameterSet, *, all_rows: bool = False) -> list[ComparedRow]:
         """Return the settings of the recipe that differ in the drive; all with `all_rows`.
@@ -67,7 +82,7 @@ class DriveRecipe:
         left = {s.parameter: "line setting" for s in links if s.role in CUTTING}
         sides = Side("recipe", self.raws, left=left), side_of("drive", values)
         rows = compare_settings(self.profile, *sides, all_rows=all_rows)
-        return [row for row in rows if row.code in self.raws and row.code not in self.ignore]
+        return [row for row in rows if row.code in self.raws]
 
 
 def is_recipe_file(path: Path) -> bool:
@@ -81,20 +96,27 @@ def is_recipe_file(path: Path) -> bool:
 def read_recipes(path: Path) -> list[DriveRecipe]:
     """Read a recipe file and its sets. Raises ProfileError with each fault, its file and line."""
     source = source_text(path)
-    recipes = decode_tables(source, RecipeList).recipes
+    listed = decode_tables(source, RecipeList)
+    recipes = listed.recipes
     faults: list[str] = []
     found: list[DriveRecipe] = []
     for index, recipe in enumerate(recipes):
         twice = any(other.device == recipe.device for other in recipes[:index])
         texts = [f"device {recipe.device} has two recipes."] if twice else []
+        left: tuple[str, ...] = ()
         try:
             profile = library.load(recipe.profile)
             texts += _faults(recipe, profile)
             sets = [_set(path, name, profile) for name in (recipe.machine, recipe.drive) if name]
-            raws = {code: raw for each in sets for code, raw in each.raws.items()}
-            absent = {code for each in sets for code in each.absent}
-            texts += _scale_faults(profile, raws, absent)
-            found.append(DriveRecipe(recipe.device, profile, raws, frozenset(recipe.ignore)))
+            if recipe.machine:
+                others = [code for code in sets[0].raws if belongs_to_drive(profile, code)]
+                left = tuple(code for code in others if rated(profile[code]))
+                sets[0] = _without(sets[0], others)
+            if sets:
+                values = _merged(sets)
+                texts += _scale_faults(profile, values.raws, values.absent)
+                values = _without(values, recipe.ignore)
+                found.append(DriveRecipe(recipe.device, profile, values, left, listed.name))
         except DriveError as error:
             texts.append(str(error))
         line = line_of(source, ("recipes", index))
@@ -102,6 +124,41 @@ def read_recipes(path: Path) -> list[DriveRecipe]:
     if faults:
         raise ProfileError("\n".join(faults))
     return found
+
+
+def belongs_to_drive(profile: Profile, code: str) -> bool:
+    """Return True for motor data, ratings and line settings: each drive has its own."""
+    setting = line_setting(profile, code)
+    return (setting is not None and setting.role in CUTTING) or rated(profile[code])
+
+
+def _merged(sets: Sequence[ParameterSet]) -> ParameterSet:
+    """Return one set; a value of a later set counts instead of an earlier one."""
+    values = sets[0]
+    for later in sets[1:]:
+        earlier = _without(values, later.raws)
+        values = replace(
+            later,
+            raws={**earlier.raws, **later.raws},
+            absent={**earlier.absent, **later.absent},
+            unknown={**earlier.unknown, **later.unknown},
+            notes={**earlier.notes, **later.notes},
+            lossy=earlier.lossy | later.lossy,
+        )
+    return replace(values, absent={c: t for c, t in values.absent.items() if c not in values.raws})
+
+
+def _without(values: ParameterSet, codes: Collection[str]) -> ParameterSet:
+    def kept(texts: Mapping[str, T]) -> dict[str, T]:
+        return {code: text for code, text in texts.items() if code not in codes}
+
+    return replace(
+        values,
+        raws=kept(values.raws),
+        absent=kept(values.absent),
+        notes=kept(values.notes),
+        lossy=values.lossy - frozenset(codes),
+    )
 
 
 def _faults(recipe: Recipe, profile: Profile) -> Iterator[str]:
