@@ -7,6 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from tui.drive.profile import library
+from tui.drive.settings.parameter_set import ParameterSet, SetHead
+from tui.drive.settings.recipes import split_sets
+from tui.drive.settings.set_file import read_set
+
 from .commands import ended, refused, run, tcp_line
 from .printed import forms_of
 
@@ -22,6 +27,7 @@ parameters = {count}
 parameters = {count}
 """
 LIST = """format = 1
+name = "Product A"
 
 [[recipes]]
 device = 4
@@ -62,6 +68,7 @@ def test_each_drive_is_compared_with_its_own_recipe(as_json: bool, file: Path) -
             document = json.loads(done.stdout)
             assert not document["equal"]
             assert [each["differs"] for each in document["drives"]] == [0, 2]
+            assert document["name"] == "Product A"
             assert [row["code"] for row in document["drives"][1]["rows"]] == ["HSP", "ACC"]
             return
         output = run(1, "compare", file, line)
@@ -69,7 +76,7 @@ def test_each_drive_is_compared_with_its_own_recipe(as_json: bool, file: Path) -
         assert "Drive 5: differs in 2." in output
         assert "belongs to the set of a drive: nCr." in output
         assert "Add" not in output, "the address belongs to the line"
-        assert run(0, "compare", file, line, "-d", "4").startswith("Drive 4: as its recipe")
+        assert run(0, "compare", file, line, "-d", "4").startswith("Product A:\nDrive 4: as its")
 
 
 def test_drive_that_does_not_answer_hinders_no_other(file: Path) -> None:
@@ -80,13 +87,13 @@ def test_drive_that_does_not_answer_hinders_no_other(file: Path) -> None:
 
 
 FAULTS = {
-    "twice": ("device = 5", "device = 4", "hall2.toml:9: device 4 has two recipes."),
-    "no set": ('machine = "pumps.toml"\nignore', "ignore", "hall2.toml:9: name a set: machine,"),
-    "code": ('["dEC"]', '["DEX"]', "hall2.toml:9: ignore: 'DEX' is not a parameter of Altivar"),
+    "twice": ("device = 5", "device = 4", "hall2.toml:10: device 4 has two recipes."),
+    "no set": ('machine = "pumps.toml"\nignore', "ignore", "hall2.toml:10: name a set: machine,"),
+    "code": ('["dEC"]', '["DEX"]', "hall2.toml:10: ignore: 'DEX' is not a parameter of Altivar"),
     "scale": (
         '"pumps.toml"\ndrive = "pump-4.toml"',
         '"pump-4.toml"',
-        "hall2.toml:3: dEC depends on Inr, which is in no set",
+        "hall2.toml:4: dEC depends on Inr, which is in no set",
     ),
     "gone": ('"pump-4.toml"', '"none.toml"', "none.toml: cannot be read"),
     "profile": ('"atv312"', '"atv313"', "atv313"),
@@ -110,8 +117,6 @@ def test_options_that_do_not_fit_recipes_are_refused(file: Path) -> None:
 
 
 def test_recipes_are_restored_to_their_own_drives(file: Path) -> None:
-    text = file.read_text("utf-8").replace("format = 1", 'format = 1\nname = "Product A"')
-    file.write_text(text, "utf-8")
     sets = ("4:ACC=40", "4:dEC=31", "5:dEC=77", "5:HSP=450")
     options = [word for text in sets for word in ("--set", text)]
     with tcp_line("atv312@4", "atv312@5", *options, "--any-settings") as line:
@@ -122,7 +127,6 @@ def test_recipes_are_restored_to_their_own_drives(file: Path) -> None:
         documents = json.loads(run(0, "restore", line, file, "--arm", "--json"))
         written_codes = [[each["code"] for each in found["results"]] for found in documents]
         assert written_codes == [["dEC"], ["HSP", "ACC"]]
-        assert run(0, "compare", file, line).startswith("Product A:")
         after = {device: held_words(line, device) for device in "45"}
     assert after["4"] == {**before["4"], "dEC": 30}
     assert after["5"] == {**before["5"], "HSP": 500, "ACC": 40}, "dEC is ignored"
@@ -138,3 +142,47 @@ def test_recipes_are_restored_to_chosen_drives_only(file: Path) -> None:
     assert "no recipe for device 9" in refused(2, "restore", "sim:atv312", file, "-d", "9", "--arm")
     words = ("restore", "sim:atv312", file, "--arm", "-p", "atv312")
     assert "omit -p" in refused(2, *words)
+
+
+@pytest.mark.sweep
+def test_recipes_are_made_from_the_drives_of_a_line(tmp_path: Path) -> None:
+    file = tmp_path / "hall.toml"
+    sets = ("4:ACC=40", "5:ACC=55", "4:HSP=450", "5:HSP=450", "4:nCr=41", "5:nCr=41")
+    options = [word for text in sets for word in ("--set", text)]
+    with tcp_line("atv312@4", "atv312@5", "atv71@6", *options, "--any-settings") as line:
+        devices = ("-d", "4", "-d", "5", "-d", "6")
+        assert "recipes of 3 drives" in run(0, "backup", line, file, "--recipe", *devices)
+        output = run(0, "compare", file, line)
+        assert output.count("as its recipe of") == 3
+        run(0, "write", line, "dEC=9", "-d", "5", "--arm")
+        assert "Drive 5: differs in 1." in run(1, "compare", file, line)
+        assert "already exists" in refused(2, "backup", line, file, "--recipe", *devices)
+    machine, drive = (read_set(tmp_path / f"hall-{name}.toml").raws for name in ("atv312", "5"))
+    assert machine["HSP"] == 450
+    assert drive["ACC"] == 55
+    assert {"ACC", "nCr", "Add"} <= drive.keys()
+    assert not machine.keys() & drive.keys()
+
+
+def test_values_on_different_scales_are_not_shared() -> None:
+    profile = library.load("atv312")
+    sets = [
+        ParameterSet(SetHead("atv312", device=device), {"Inr": inr, "ACC": 30, "HSP": 500})
+        for device, inr in ((4, 1), (5, 0))
+    ]
+    machine, rest = split_sets(profile, sets)
+    assert machine.raws == {"HSP": 500}
+    assert [each.raws for each in rest] == [{"Inr": 1, "ACC": 30}, {"Inr": 0, "ACC": 30}]
+
+
+def test_backup_of_several_drives_needs_recipes(tmp_path: Path) -> None:
+    file = tmp_path / "new.toml"
+    words = ("backup", "sim:atv312", file)
+    assert "require --recipe" in refused_usage(*words, "-d", "1", "-d", "2")
+    assert "neither --all" in refused_usage(*words, "--recipe", "--all")
+    assert not file.exists()
+
+
+def refused_usage(*words: str | Path) -> str:
+    """Standard error of words that do not go together."""
+    return ended(2, *words).stderr

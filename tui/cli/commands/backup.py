@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure
-from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
+from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure, end_with
+from ..shared.options import Target, json_option, line_argument, never_forced, several_settings
 from ..shared.registration import ON_LINE, command
 from ..shared.say import Messages
 from ..shared.sets import (
@@ -31,15 +31,29 @@ _SETTINGS = "{file}: {count} settings of {name}"
 @click.option(
     "--all", "everything", is_flag=True, help="Add measurements, counters and command words."
 )
+@click.option("--recipe", is_flag=True, help="Write recipes for several drives (repeat -d).")
 @json_option
-@settings_options
+@several_settings
 @never_forced
-def backup(target: Target, file: Path, force: bool, everything: bool, as_json: bool) -> None:
+def backup(
+    target: Target, file: Path, force: bool, everything: bool, recipe: bool, as_json: bool
+) -> None:
     """Back up the settings of a drive to FILE, one line per parameter; `-` is standard output.
 
     The file is TOML, and easy to diff: two backups of an unchanged drive differ in their time only.
     To change a value by hand, edit `value` and delete `raw` from that line.
+
+    With --recipe, FILE names the sets of several drives: what they share, and what belongs to each.
     """
+    if recipe:
+        if everything or file == STANDARD:
+            raise click.UsageError("--recipe takes neither --all nor standard output.")
+        from ..running.recipe_backup import back_up_recipes
+
+        end_with(back_up_recipes(target, file, force=force, as_json=as_json))
+        return
+    if target.others:
+        raise click.UsageError("Several -d require --recipe.")
     from tui.drive.settings.parameter_set import dump_set
 
     from ..documents.setting_documents import BackupDocument

@@ -15,6 +15,7 @@ from typing import Annotated, Literal, TypeVar
 from msgspec import Meta
 
 from ..errors import DriveError, ProfileError
+from ..plain import escaped_toml
 from ..profile import library
 from ..profile.help_file import decode_tables, line_of
 from ..profile.profile import Profile
@@ -185,3 +186,35 @@ def _set(path: Path, name: str, profile: Profile) -> ParameterSet:
     if values.head.profile != profile.id:
         raise ProfileError(f"{name} is a set of {values.head.profile}, not of {profile.id}.")
     return values
+
+
+def split_sets(
+    profile: Profile, sets: Sequence[ParameterSet]
+) -> tuple[ParameterSet, list[ParameterSet]]:
+    """Return the set that drives of one family share, and the rest of each.
+
+    Shared are settings with one value in all of them, on one scale. Motor data, ratings and line
+    settings stay with each drive.
+    """
+    first = sets[0]
+    shared = {
+        code: raw
+        for code, raw in first.raws.items()
+        if not belongs_to_drive(profile, code) and all(s.raws.get(code) == raw for s in sets)
+    }
+    # a raw value means the same only if its scale is the same in all drives
+    while apart := [c for c in shared if any(s not in shared for s in depends_on(profile[c]))]:
+        for code in apart:
+            del shared[code]
+    head = replace(first.head, line="", device=0, identity={})
+    return ParameterSet(head, shared), [_without(each, shared) for each in sets]
+
+
+def dump_recipes(rows: Sequence[tuple[int, str, str, str]]) -> str:
+    """Return the text of a recipe file; a row is device, profile, files of machine and drive."""
+    keys = ("profile", "machine", "drive")
+    lines = ["# Recipes of a line. See docs/parameter-sets.md.", "format = 1"]
+    for device, *texts in rows:
+        lines += ["", "[[recipes]]", f"device = {device}"]
+        lines += [f"{k} = {escaped_toml(text)}" for k, text in zip(keys, texts, strict=True)]
+    return "\n".join([*lines, ""])
