@@ -165,20 +165,21 @@ def test_html_page_escapes_texts_and_loads_nothing(tmp_path: Path) -> None:
 
 def wide_page() -> ReportPage:
     """A page with the longest texts and the most rows of each section."""
-    long = "Wide name " * 4
-    rows = [("WWWW", long, "W" * 30, "W" * 30)] * 90
-    test = ("2026-11-11", long, f"NOT PASSED. {long}", "10 of 10", "CHANGED", long)
-    trip = ("2026-11-11 11:11:11", "WWW", long, "2026-11-11 11:11:11")
+    long, wide = "Wide name " * 4, "W" * 60
+    rows = [("WWWW", long, wide, wide)] * 90
+    test = ("2026-11-11", long, f"NOT PASSED. {wide}", "10 of 10", "CHANGED", wide)
+    trip = ("2026-11-11 11:11:11", "WWW", wide, "2026-11-11 11:11:11")
+    adapter = "serial:/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0 19200 8E1"
+    pairs = [("Line", f"{adapter}, address 100"), *((f"Key {n}", long) for n in range(9))]
+    tested = ("date", "test", "result", "steps", "settings", "by")
     sections = [
-        ReportSection("Identity", [(f"Key {n}", long) for n in range(10)]),
-        ReportSection("Settings", rows, ("code", "name", "factory", "now"), long * 3),
-        ReportSection(
-            "Tests", [test] * 5, ("date", "test", "result", "steps", "settings", "by"), long
-        ),
-        ReportSection("Trips", [trip] * 5, ("seen", "fault", "name", "reset"), long * 2),
+        ReportSection("Identity", pairs),
+        ReportSection("Settings", rows, ("code", "name", "factory", "now"), long * 4),
+        ReportSection("Tests", [test] * 5, tested, "3 more are not shown."),
+        ReportSection("Trips", [trip] * 5, ("seen", "fault", "name", "reset"), wide + long * 2),
         ReportSection("Operation", [("Energy consumed", "3671 kWh")] * 3),
     ]
-    return ReportPage("W" * 80, "W" * 120, sections, ["W" * 120] * 2)
+    return ReportPage("W" * 80, f"{wide} for {wide}", sections, [f"{wide}, {wide}"] * 2)
 
 
 def test_text_page_fits_a_sheet_and_counts_what_it_omits() -> None:

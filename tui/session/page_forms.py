@@ -18,7 +18,7 @@ from .report import table_markdown
 from .report_page import ReportPage, ReportSection, report_page
 from .stored_results import results_in
 
-ROWS_A4, ROWS_TEXT = 32, 20
+ROWS_A4, ROWS_TEXT = 32, 18
 """Most rows of a section, so that the page fits one sheet of paper."""
 TEXT_WIDTH = 80
 ROWS_OMITTED = "{left} more are not shown. The full report and a backup have all."

@@ -20,7 +20,7 @@ from .connect.line_key import line_key
 from .read.upload import setting_codes
 
 FILES_READ = 500
-"""Most JSON files that are read, so that a large folder does not delay a report."""
+"""Most JSON files that are read, the newest first: a large folder must not delay a report."""
 
 
 class StoredStep(msgspec.Struct):
@@ -54,11 +54,20 @@ class StoredResult(msgspec.Struct):
 def results_in(folder: Path) -> list[StoredResult]:
     """Return the results in a folder and its subfolders, newest first; skip all other files."""
     found: list[StoredResult] = []
-    for path in sorted((*folder.glob("*.json"), *folder.glob("*/*.json")))[-FILES_READ:]:
+    paths = sorted((*folder.glob("*.json"), *folder.glob("*/*.json")), key=_age)
+    for path in paths[:FILES_READ]:
         # a missing field, or a half of a character, is not a result either
         with suppress(OSError, ValueError, RecursionError, msgspec.ValidationError):
             found.append(msgspec.convert(json.loads(read_small_text(path)), StoredResult))
     return sorted(found, key=lambda result: result.begun.timestamp(), reverse=True)
+
+
+def _age(path: Path) -> float:
+    """Return a number that is smaller for a newer file."""
+    try:
+        return -path.stat().st_mtime
+    except OSError:
+        return 0.0
 
 
 def results_of(results: Iterable[StoredResult], values: ParameterSet) -> list[StoredResult]:

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Collection, Iterable
 from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tui.drive.errors import DriveError
+from tui.drive.profile import library
 from tui.drive.settings.parameter_set import ParameterSet
-from tui.drive.settings.set_file import read_set
+from tui.drive.settings.set_file import load_set
+from tui.drive.small_file import read_small_text
 
 from ..connect.line_key import line_key
 from ..paths import state_folder
@@ -43,9 +46,14 @@ def newest_set(
     The set names the line and the address, so it is not one of another machine.
     """
     key = line_key(line)
+    # a folder may have many sets of other drives: parsing each of them for each drive takes long
+    own = re.compile(rf"^\s*device\s*=\s*{device}\b", re.MULTILINE)
     for path in files_in([Path.cwd(), state_folder()]):
-        with suppress(DriveError):
-            values = read_set(path, path.name)
+        with suppress(DriveError, OSError, UnicodeDecodeError):
+            text = read_small_text(path)
+            if own.search(text) is None:
+                continue
+            values = load_set(text, path.name, library.load)
             head = values.head
             known = head.profile in families and head.device == device and head.line
             if known and line_key(head.line) == key:
