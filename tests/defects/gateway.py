@@ -211,10 +211,10 @@ DEFECTS = (
     Defect(
         "cut-short-is-kept-as-done",
         "tui/session/gateway/writes.py",
-        """answer = ENDED_BEFORE_ANSWER
+        """answer, stored = ENDED_BEFORE_ANSWER, True
         try:
             pdu =""",
-        """answer = "ok"
+        """answer, stored = "ok", True
         try:
             pdu =""",
         "The journal says that a drive took a value although the result is unknown.",

@@ -6,7 +6,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import msgspec
 import pytest
@@ -14,6 +14,7 @@ import pytest
 from tests.session.sets_bench import Bench, bench
 from tui.cli.derived import with_confirmed
 from tui.drive.errors import ValueRefused
+from tui.drive.family_page import SURENESS
 from tui.drive.profile import library
 from tui.drive.profile.evidence import (
     EvidenceError,
@@ -26,12 +27,14 @@ from tui.drive.profile.example_frames import FramePair, example_frames_of
 from tui.drive.profile.json_schema import schema_text
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import (
+    Confidence,
     EvidenceDrive,
     EvidenceFinding,
     EvidenceResult,
     Parameter,
     ProfileEvidence,
 )
+from tui.screens.parameters.value_text import CONFIDENCE_WORDS
 from tui.session.conformance import FROM_A_MANUAL, Conformance
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -109,6 +112,17 @@ async def test_display_that_shows_0_proves_nothing() -> None:
         assert (await answered(made, "LSP", "5.0")).result == "contradicted"
         with pytest.raises(ValueRefused):
             await answered(made, "ACC", "quick")
+
+
+async def test_display_may_show_a_name_or_its_number() -> None:
+    with bench("atv71") as made:
+        made.drive.set("STT", 1)
+        name = made.profile.names(made.profile["STT"])[1]
+        assert (await answered(made, "STT", name.upper())).result == "confirmed"
+        assert (await answered(made, "STT", "1")).result == "confirmed"
+        assert (await answered(made, "STT", "0")).result == "contradicted"
+        with pytest.raises(ValueRefused, match="not a value of STT"):
+            await answered(made, "STT", "quickly")
 
 
 def evidence(
@@ -215,6 +229,11 @@ def test_page_of_confirmed_drives_is_up_to_date_and_counts_real_drives_only(
     row = "| atv21 | ATV21H075M3X | 1.2 | 2026-03-01, RTU 19200 8E1 | dEC |  |"
     assert row in with_confirmed(page, tmp_path)
     assert len(all_evidence(tmp_path)) == 2
+
+
+def test_every_confidence_has_words_on_the_screens() -> None:
+    assert set(get_args(Confidence)) == set(CONFIDENCE_WORDS) == set(SURENESS)
+    assert CONFIDENCE_WORDS["site"] == SURENESS["site"] == "proved on this site"
 
 
 def test_schema_of_evidence_is_up_to_date() -> None:

@@ -23,7 +23,7 @@ from tui.drive.profile.schema import (
     Parameter,
     Quantity,
 )
-from tui.drive.sentences import counted
+from tui.drive.sentences import counted, first_of
 from tui.drive.shown import depends_on, number_of, shown_text
 from tui.drive.teaching import parse_display
 from tui.drive.values import check_raw, is_enumeration
@@ -123,10 +123,21 @@ class Conformance:
         )
 
     def _agrees(self, parameter: Parameter, raw: int, typed: str) -> bool:
-        """Return True if a raw value means what was typed, to the decimals of the display."""
+        """Return True if a raw value means what was typed, to the decimals of the display.
+
+        A display may show the number of a named value. Raises ValueRefused for an unknown name,
+        because the profile may have the same value in other words.
+        """
         profile, image = self.session.profile, self.session.image
         if is_enumeration(parameter):
-            return typed.casefold() == profile.names(parameter).get(raw, "").casefold()
+            names = profile.names(parameter)
+            known = {name.casefold(): value for value, name in names.items()}
+            known |= {str(value): value for value in names}
+            if typed.casefold() not in known:
+                raise ValueRefused(
+                    f"{typed!r} is not a value of {parameter.code}. Known: {first_of([*known], 8)}."
+                )
+            return known[typed.casefold()] == raw
         value = number_of(profile, parameter, raw, image.raws, image.lacking)
         if value is None:
             return False

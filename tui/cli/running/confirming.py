@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING
 import tui
 from tui.drive.sentences import counted
 
+from ..shared.drive_commands import watched
 from ..shared.errors import DIFFERENT, DONE, Failure
-from ..shared.options import Target, connect_drive, on_line
+from ..shared.options import Target, on_line
 from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.sets import counter, write_down
@@ -44,20 +45,27 @@ def confirm_profile(
         from tui.drive.profile.library import evidence_folder
         from tui.session.conformance import Conformance
 
-        session = await connect_drive(opened, target._replace(force_profile=True))
-        wanted = [session.profile.find(code).code for code in codes]
-        kind = await _kind(opened)
-        test = Conformance(session)
-        await test.run(counter("Read"))
-        for code in (wanted or test.codes_to_ask()) if may_ask() else wanted:
-            await _ask_display(test, code)
+        # a drive that is not polled while a person types may react to its timeout
+        async with watched(opened, target._replace(force_profile=True)) as (_, console):
+            session = console.session
+            wanted = [session.profile.find(code).code for code in codes]
+            kind = await _kind(opened)
+            test = Conformance(session)
+            await test.run(counter("Read"))
+            for code in (wanted or test.codes_to_ask()) if may_ask() else wanted:
+                await _ask_display(test, code)
         evidence = _evidence(session, test.findings, kind)
         now = datetime.now().strftime("%Y%m%d-%H%M%S")
         path = file or evidence_folder() / f"{session.profile.id}-{now}.json"
         if file is None and kind != "drive":
             path = Path(f"{session.profile.id}-{now}.json")
+        if not as_json:
+            _say_findings(evidence)  # before the disk can refuse the file
         await asyncio.to_thread(_write, path, evidence, force=force)
-        _report(evidence, path, as_json=as_json)
+        if as_json:
+            print_json(_document(evidence, path))
+        else:
+            _say_result(evidence, path)
         return DIFFERENT if evidence.count("contradicted") else DONE
 
     return on_line(target, work, read_only=True)
@@ -156,10 +164,8 @@ def _document(evidence: ProfileEvidence, path: Path) -> ConfirmDocument:
     )
 
 
-def _report(evidence: ProfileEvidence, path: Path, *, as_json: bool) -> None:
-    if as_json:
-        print_json(_document(evidence, path))
-        return
+def _say_findings(evidence: ProfileEvidence) -> None:
+    """Show the findings, without the addresses that only answered."""
     for result in ("contradicted", "confirmed", "open"):
         found = [f for f in evidence.findings if f.result == result]
         if result == "confirmed":
@@ -171,9 +177,12 @@ def _report(evidence: ProfileEvidence, path: Path, *, as_json: bool) -> None:
             say(f"{result:<12}  {finding.subject} {name}: {finding.seen}", indent=14)
         if len(found) > LISTED:
             say(f"{result:<12}  and {len(found) - LISTED} more in the file")
+
+
+def _say_result(evidence: ProfileEvidence, path: Path) -> None:
     say(
         f"{evidence.count('confirmed')} confirmed, {evidence.count('contradicted')} contradicted,"
-        f" {evidence.count('open')} open. ProfileEvidence: {path}"
+        f" {evidence.count('open')} open. Evidence: {path}"
     )
     proved = sum(f.subject == "value" and f.result == "confirmed" for f in evidence.findings)
     if evidence.tested.kind != "drive":
