@@ -130,10 +130,14 @@ confidence = "manual"
 """
 
 
-def installed_mixer(reference: str = HERTZ) -> Profile:
-    """Install the drive among the user profiles."""
+def installed_mixer(reference: str = HERTZ, more: str = "", *changes: tuple[str, str]) -> Profile:
+    """Install the drive among the user profiles, with more rows and with changed texts."""
+    text = mixer_text(reference) + more
+    for before, after in changes:
+        assert before in text, before
+        text = text.replace(before, after)
     folder = library.user_folder()
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "mixer.toml").write_text(mixer_text(reference), encoding="utf-8")
+    (folder / "mixer.toml").write_text(text, encoding="utf-8")
     library.load.cache_clear()
     return library.load(MIXER)

@@ -196,6 +196,28 @@ DEFECTS = (
         ),
     ),
     Defect(
+        "float-that-is-no-number-shown",
+        "tui/drive/words.py",
+        "    if not math.isfinite(number):\n        return NOT_A_NUMBER\n",
+        "    if not math.isfinite(number):\n        return 0\n",
+        "A float that is not a number is shown as 0.",
+        (
+            "tests/session/test_other_makes.py"
+            "::test_float_that_is_no_number_is_neither_shown_nor_written",
+        ),
+    ),
+    Defect(
+        "offset-forgotten",
+        "tui/drive/values.py",
+        "counts = (number - Decimal(parameter.offset)) / scale",
+        "counts = number / scale",
+        "A typed value with an offset is written as another one.",
+        (
+            "tests/session/test_other_makes.py"
+            "::test_typed_value_with_an_offset_or_a_negative_scale_leads_to_its_count",
+        ),
+    ),
+    Defect(
         "full-scale-ignored",
         "tui/drive/profile/profile.py",
         "return None if not raw else raw * Decimal(source.scale) / full.counts",

@@ -65,7 +65,7 @@ DEFECTS = (
     ),
     Defect(
         "sign-lost-at-the-lowest-value",
-        "tui/drive/values.py",
+        "tui/drive/words.py",
         "raw >= 1 << (width - 1)",
         "raw > 1 << (width - 1)",
         "The most negative value is shown as a large positive one.",
@@ -73,7 +73,7 @@ DEFECTS = (
     ),
     Defect(
         "word-order-of-32-bits",
-        "tui/drive/values.py",
+        "tui/drive/words.py",
         "low, high = words if parameter.low_word_first else reversed(words)",
         "high, low = words if parameter.low_word_first else reversed(words)",
         "Hours and energy are shown 65536 times too large.",

@@ -88,6 +88,7 @@ def path(
 
 
 Change = tuple[str, str]
+PLACE = "\n[[enumerations]]"
 FULL_SCALE = 'unit = "{}"\nfull_scale = {{ counts = 20000, parameter = "{}" }}'
 BY_SIGN = """
 [[references]]
@@ -117,13 +118,33 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "a command word of 32 bits": (
         [("address = 300\n", 'address = 300\ntype = "uint32"\n')],
-        "CTRL has 32 bits. A command word or a status word has 16 bits",
+        "CTRL has 32 bits. A command word has 16 bits",
         'command = "CTRL"',
     ),
-    "a status word of 32 bits": (
-        [("address = 100\n", 'address = 100\ntype = "uint32"\n')],
-        "STAT has 32 bits",
+    "a status word with a fraction": (
+        [("address = 100\n", 'address = 100\ntype = "float32"\nscale = "0.1"\n')],
+        "STAT is float32. Use uint32.",
         'status = "STAT"',
+    ),
+    "a state in bits that a word of 16 bits lacks": (
+        [(RUNNING, RUNNING.replace("0x0002", "0x20002"))],
+        "STAT has 16 bits, its mask more",
+        '{ id = "running"',
+    ),
+    "a bit that a word of 16 bits lacks": (
+        [('bit = 3, name = "Pump dry"', 'bit = 16, name = "Pump dry"')],
+        "there is no bit 16 in uint16: 0 to 15",
+        "bits = [",
+    ),
+    "a float without a resolution": (
+        [(PLACE, f"{PAIR.replace('uint32', 'float32')}{PLACE}")],
+        "a float32 has a resolution as its scale",
+        'type = "float32"',
+    ),
+    "a limit of a value with an offset": (
+        [('unit = "s"\nscale = "0.01"', 'unit = "s"\noffset = "-40"\nmax_from = "TOUT"')],
+        "an offset or a negative scale has neither",
+        '[[parameters]]\ncode = "RAMP"',
     ),
     "a command that is a part of a register": (
         [("address = 300\n", "address = 300\nmask = 0x00FF\n")],

@@ -16,7 +16,7 @@ from .errors import ValueRefused
 from .profile.profile import Profile
 from .profile.schema import Parameter
 from .teaching import TaughtScale
-from .values import Conversion, Value, decode, encode, engineering
+from .values import NOT_A_NUMBER, Conversion, Value, decode, encode, engineering
 
 
 def shown(
@@ -116,7 +116,9 @@ def number_of(
     if (taught := profile.taught.get(parameter.code)) is not None:
         return taught.number(raw)
     scale = profile.scale(parameter, raws, absent)
-    return None if scale is None else engineering(raw, scale)
+    if scale is None or (raw == NOT_A_NUMBER and parameter.type == "float32"):
+        return None
+    return engineering(raw, scale, parameter.offset)
 
 
 def scale_sources(profile: Profile) -> frozenset[str]:

@@ -39,6 +39,7 @@ def is_raw(family: Profile, parameter: Parameter) -> bool:
         parameter.unit or parameter.scale_source or parameter.unit_by or parameter.values
     )
     reported = reported or bool(parameter.enumeration or parameter.bits) or parameter.scale != "1"
+    reported = reported or parameter.offset != "0"
     return not reported and (measured or not is_verified(parameter)) and word_count(parameter) == 1
 
 

@@ -14,6 +14,16 @@ from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
 from .errors import NotAValue, ValueRefused
 from .profile.schema import Bit, Parameter
 from .units import factor_between
+from .words import (
+    NOT_A_NUMBER,
+    from_words,
+    hexadecimal,
+    is_field,
+    is_signed_type,
+    to_words,
+    type_range,
+    word_count,
+)
 
 LONGEST_NUMBER = 30
 """Most digits before or after the decimal point of a typed number."""
@@ -54,60 +64,6 @@ class Conversion:
     """True if rounding changed the value: it became 0, or one of two equally near values."""
 
 
-def word_count(parameter: Parameter) -> int:
-    """Return the number of registers of the parameter: 1 or 2."""
-    return 2 if parameter.type.endswith("32") else 1
-
-
-def from_words(parameter: Parameter, words: Sequence[int]) -> int:
-    """Return the raw value in the parameter's registers, by its sign, word order and bits."""
-    if word_count(parameter) == 2:
-        low, high = words if parameter.low_word_first else reversed(words)
-        raw, width = (high << 16) | low, 32
-    else:
-        raw, width = words[0] >> parameter.shift & parameter.mask, 16
-    if parameter.type.startswith("int") and raw >= 1 << (width - 1):
-        raw -= 1 << width
-    return raw
-
-
-def is_field(parameter: Parameter) -> bool:
-    """Return True if the parameter is only a part of the bits of its register."""
-    return parameter.shift != 0 or parameter.mask != 0xFFFF
-
-
-def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[int, ...]:
-    """Return the register words for a raw value; raises ValueRefused if it does not fit.
-
-    `held` is the present word of the drive. It is required for a field of a register, because the
-    other bits must be kept.
-    """
-    low, high = type_range(parameter)
-    if not low <= raw <= high:
-        raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
-    if word_count(parameter) == 1:
-        own = parameter.mask << parameter.shift
-        if held is None:
-            if is_field(parameter):
-                raise ValueRefused(
-                    f"{parameter.code} is a part of a word, and the other bits were not read."
-                )
-            held = 0
-        return (held & ~own & 0xFFFF | raw << parameter.shift & own,)
-    pair = (raw & 0xFFFF, (raw >> 16) & 0xFFFF)
-    return pair if parameter.low_word_first else (pair[1], pair[0])
-
-
-def type_range(parameter: Parameter) -> tuple[int, int]:
-    """Return the lowest and highest raw value that the parameter's type can hold."""
-    width = 32 if parameter.type.endswith("32") else 16
-    if is_field(parameter):
-        return 0, parameter.mask
-    if parameter.type.startswith("int"):
-        return -(1 << (width - 1)), (1 << (width - 1)) - 1
-    return 0, (1 << width) - 1
-
-
 def raw_range(parameter: Parameter) -> tuple[int, int]:
     """Return the lowest and highest raw value that the profile allows, within the type."""
     low, high = type_range(parameter)
@@ -117,12 +73,16 @@ def raw_range(parameter: Parameter) -> tuple[int, int]:
     )
 
 
-def engineering(raw: int, scale: Decimal) -> Decimal:
-    """Return the engineering value of a raw value, with `decimals_of(scale)` decimals."""
+def engineering(raw: int, scale: Decimal, offset: str = "0") -> Decimal:
+    """Return the engineering value of a raw value, with `decimals_of(scale)` decimals.
+
+    An offset with more decimals keeps them.
+    """
     number, decimals = raw * scale, decimals_of(scale)
-    if -int(scale.as_tuple().exponent) <= decimals:
-        return number
-    return number.quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP)
+    if -int(scale.as_tuple().exponent) > decimals:
+        number = number.quantize(Decimal(1).scaleb(-decimals), ROUND_HALF_UP)
+    # also at 0, where a negative scale gives -0
+    return number if raw and offset == "0" else number + Decimal(offset)
 
 
 def decimals_of(scale: Decimal) -> int:
@@ -144,7 +104,9 @@ def possible_decimals(parameter: Parameter) -> int:
     if parameter.full_scale is not None:
         return decimals_of(USUAL_FULL_SCALE / parameter.full_scale.counts)
     by = parameter.scale_by
+    # an offset with more decimals than the scale keeps them
     scales = [parameter.scale, *(by.scales.values() if by is not None else ())]
+    scales += [parameter.offset] if "." in parameter.offset else []
     return max(decimals_of(Decimal(scale)) for scale in scales)
 
 
@@ -157,14 +119,16 @@ def decode(
     decimals of its scale. Without a scale, it is the raw value itself with unit `raw`.
     """
     if parameter.bits:
-        return Value(raw, None, "", f"16#{raw & 0xFFFF:04X}")
+        return Value(raw, None, "", hexadecimal(parameter, raw))
+    if raw == NOT_A_NUMBER and parameter.type == "float32":
+        return Value(raw, None, "", "not a number")
     if (name := names.get(raw)) is not None:
         return Value(raw, None, "", name)
     if is_enumeration(parameter):
         return Value(raw, None, "", f"unknown ({raw})")
     if scale is None:
         return Value(raw, Decimal(raw), "raw", str(raw))
-    number = engineering(raw, scale)
+    number = engineering(raw, scale, parameter.offset)
     unsure = parameter.sure_up_to is not None and raw > parameter.sure_up_to
     return Value(raw, number, parameter.unit, f"{number:f}{'?' * unsure}", unsure=unsure)
 
@@ -215,10 +179,10 @@ def encode(
             text = _NO_FULL_SCALE if parameter.full_scale is not None else text
             raise ValueRefused(text.format(code=parameter.code, source=source))
         number = _number(parameter, typed, names)
-        counts = number / scale
+        counts = (number - Decimal(parameter.offset)) / scale
         raw = int(counts.to_integral_value(ROUND_HALF_UP))
         # the decimals of a long scale are cut where it is shown: what is shown can be typed
-        rounded = counts != raw and number != engineering(raw, scale)
+        rounded = counts != raw and number != engineering(raw, scale, parameter.offset)
         lossy = rounded and (raw == 0 or abs(counts - raw) >= HALF_A_STEP)
     check_raw(parameter, raw, names, scale)
     return Conversion(raw, rounded, lossy)
@@ -244,13 +208,14 @@ def check_raw(
     """Raise ValueRefused unless the profile lets the parameter hold this raw value."""
     low, high = raw_range(parameter)
     if not low <= raw <= high and raw not in names:
+        ends = (high, low) if scale is not None and scale < 0 else (low, high)
         text = _OUT_OF_DOUBTED_RANGE if _has_doubted_limits(parameter) else _OUT_OF_RANGE
         raise ValueRefused(
             text.format(
                 code=parameter.code,
                 value=_plain(parameter, raw, scale),
-                low=_plain(parameter, low, scale),
-                high=_plain(parameter, high, scale),
+                low=_plain(parameter, ends[0], scale),
+                high=_plain(parameter, ends[1], scale),
             )
         )
     to_words(parameter, raw, held=0)
@@ -265,7 +230,7 @@ def check_raw(
 def _plain(parameter: Parameter, raw: int, scale: Decimal | None) -> str:
     if scale is None:
         return f"raw {raw}"
-    return f"{engineering(raw, scale):f} {parameter.unit}".rstrip()
+    return f"{engineering(raw, scale, parameter.offset):f} {parameter.unit}".rstrip()
 
 
 def _has_doubted_limits(parameter: Parameter) -> bool:
@@ -320,6 +285,7 @@ def percent_of(percent: Decimal, rating: Decimal) -> Decimal:
 
 __all__ = [
     "NOT_AVAILABLE",
+    "NOT_A_NUMBER",
     "Conversion",
     "Value",
     "check_raw",
@@ -328,8 +294,10 @@ __all__ = [
     "encode",
     "engineering",
     "from_words",
+    "hexadecimal",
     "is_enumeration",
     "is_field",
+    "is_signed_type",
     "percent_of",
     "possible_decimals",
     "raw_range",

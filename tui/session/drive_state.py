@@ -10,7 +10,7 @@ from typing import TypeVar
 from tui.drive.chart import ChartState, Direction, read_chart
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Bit, FaultCode, Parameter, StateKind
-from tui.drive.values import Value, set_bits
+from tui.drive.values import Value, is_signed_type, set_bits
 
 from .shown import Quality, Shown
 
@@ -117,7 +117,7 @@ def with_direction(parameter: Parameter, number: Signed, state: DriveState) -> S
 
     Some drives report it without a sign, and the direction in the status word.
     """
-    signed = parameter.type.startswith("int")
+    signed = is_signed_type(parameter)
     return -number if not signed and state.direction == "reverse" else number
 
 

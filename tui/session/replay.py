@@ -13,7 +13,7 @@ from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile, digest_of
-from tui.drive.values import from_words, word_count
+from tui.drive.values import from_words, is_signed_type, word_count
 
 from .connect.identify import DriveIdentity, identity_from
 from .console import DriveConsole
@@ -112,7 +112,7 @@ def _means(profile: Profile) -> dict[tuple[int, int], bool]:
     for parameter in profile.data.parameters:
         is_number = bool(parameter.unit) and not parameter.bits and not profile.names(parameter)
         if is_number and word_count(parameter) == 1:
-            signed = parameter.type.startswith("int")
+            signed = is_signed_type(parameter)
             found[parameter.function, parameter.address] = signed
     return found
 

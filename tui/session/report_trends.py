@@ -10,6 +10,7 @@ from typing import Literal, NamedTuple
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
+from tui.drive.values import is_signed_type
 
 from .acceptance.curve import RunCurve, RunPoint, curve_svg
 from .changes import local_time, run_text
@@ -123,7 +124,7 @@ def _trend(
 
 
 def _is_signed(history: History) -> bool:
-    return history.entry is not None and history.entry.type.startswith("int")
+    return history.entry is not None and is_signed_type(history.entry)
 
 
 def _points(

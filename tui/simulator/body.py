@@ -8,6 +8,7 @@ from enum import Enum
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.values import is_signed_type
 
 from .plant.conditions import Conditions
 from .plant.motor import MotorState, RatingPlate, Stop
@@ -129,7 +130,8 @@ class Body:
 
     def engineering(self, parameter: Parameter) -> float:
         """Engineering value in force of a parameter."""
-        return self.registers.in_force(parameter) * self.scale(parameter)
+        raw = self.registers.in_force(parameter)
+        return raw * self.scale(parameter) + float(parameter.offset)
 
     def scale(self, parameter: Parameter) -> float:
         """Return the value of one count, from the parameter that defines its scale.
@@ -159,8 +161,9 @@ class Body:
         An unsigned word shows the magnitude.
         """
         if found := self.parameter(quantity):
-            value = engineering if found.type.startswith("int") else abs(engineering)
-            self.registers.put(found, round(value / self.scale(found)))
+            signed = is_signed_type(found) or found.offset != "0"
+            value = engineering if signed else abs(engineering)
+            self.registers.put(found, round((value - float(found.offset)) / self.scale(found)))
 
     def show_raw(self, quantity: Quantity, raw: int) -> None:
         """Put a raw value into the word of a quantity, if the family has one."""

@@ -145,7 +145,7 @@ def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
     order = reading.get("low_word_first") if isinstance(reading, dict) else None
     if isinstance(order, bool) and isinstance(rows, list):
         for row in rows:
-            if isinstance(row, dict) and row.get("type") in ("uint32", "int32"):
+            if isinstance(row, dict) and str(row.get("type")).endswith("32"):
                 row.setdefault("low_word_first", order)
     return tables
 

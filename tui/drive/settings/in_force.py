@@ -55,8 +55,10 @@ def limits_in_force(
     if parameter.access == "r" or parameter.bits or is_enumeration(parameter) or scale is None:
         return None
     lowest, highest = raw_range(parameter)
-    low = None if parameter.min is None else engineering(lowest, scale)
-    high = None if parameter.max is None else engineering(highest, scale)
+    low = None if parameter.min is None else engineering(lowest, scale, parameter.offset)
+    high = None if parameter.max is None else engineering(highest, scale, parameter.offset)
+    if scale < 0:
+        low, high = high, low
     low_by = high_by = ""
     for under, over in limit_pairs(profile):
         other = over if parameter.code == under else under
@@ -78,7 +80,7 @@ def limits_in_force(
     if parameter.min_of and least is not None and (low is None or least > low):
         low, low_by = least, parameter.min_of.parameter
     unit, sure = profile.unit(parameter, raws), limits_are_sure(parameter)
-    return LimitsInForce(low, high, unit, scale, low_by, high_by, sure)
+    return LimitsInForce(low, high, unit, abs(scale), low_by, high_by, sure)
 
 
 def limit_passed(profile: Profile, before: Edits, after: Edits, raws: Mapping[str, int]) -> str:

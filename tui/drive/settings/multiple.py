@@ -26,7 +26,7 @@ def counts_of(
     # a rated current of 0 is not a valid rating
     if number is None or (number == 0 and Decimal(of.plus) == 0):
         return None
-    counts = (Decimal(of.times) * number + Decimal(of.plus)) / scale
+    counts = (Decimal(of.times) * number + Decimal(of.plus) - Decimal(parameter.offset)) / scale
     return int(counts.to_integral_value(ROUND_FLOOR))
 
 
@@ -40,7 +40,7 @@ def value_of(
     """Return the multiple in the parameter's unit, truncated to a count; None if not known."""
     counts = counts_of(profile, parameter, of, raws, absent)
     scale = profile.scale(parameter, raws, absent)
-    return None if counts is None or scale is None else engineering(counts, scale)
+    return None if counts is None or scale is None else engineering(counts, scale, parameter.offset)
 
 
 def formula_of(of: Multiple) -> str:

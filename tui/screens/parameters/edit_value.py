@@ -16,6 +16,7 @@ from tui.drive.profile.schema import Parameter
 from tui.drive.settings.factory import factory_is_sure, factory_raw
 from tui.drive.settings.in_force import limit_passed
 from tui.drive.shown import number_of, raw_of_text
+from tui.drive.values import hexadecimal, word_count
 from tui.session.settings.editor import Editor
 from tui.widgets.fields import NumberInput
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
@@ -100,7 +101,7 @@ class EditNumber(Question[str | None]):
             held.update(reported)
             return True
         shown = Text(f"→ {edit.text}", STRONG)
-        shown.append(f"   raw {edit.new} = 16#{edit.new & 0xFFFF:04X}", FAINT)
+        shown.append(f"   raw {edit.new} = {hexadecimal(parameter, edit.new)}", FAINT)
         if edit.rounded:
             shown.append(f"   {ROUNDED}", ALARM)
         if edit.warning:
@@ -117,7 +118,9 @@ class EditNumber(Question[str | None]):
             raw = raw_of_text(profile, parameter, field.value, raws, lacking).raw
         except DriveError:
             return
-        number = number_of(profile, parameter, raw + steps, raws, lacking)
+        # at a negative scale, the next higher value has the next lower count
+        counts = -steps if parameter.scale.startswith("-") else steps
+        number = number_of(profile, parameter, raw + counts, raws, lacking)
         if number is None:
             return
         field.value = f"{number:f}"
@@ -215,8 +218,9 @@ class EditBits(KeyQuestion[int | None]):
     ) -> None:
         super().__init__(now)
         self._parameter = parameter
-        self._held = editor.values.raws.get(parameter.code, 0) & 0xFFFF
-        self._word = (first_raw(editor, parameter.code, proposed) or 0) & 0xFFFF
+        self._all = (1 << 16 * word_count(parameter)) - 1
+        self._held = editor.values.raws.get(parameter.code, 0) & self._all
+        self._word = (first_raw(editor, parameter.code, proposed) or 0) & self._all
 
     def dialog(self) -> ComposeResult:
         """All named bits; reserved ones are disabled."""
@@ -245,7 +249,7 @@ class EditBits(KeyQuestion[int | None]):
             text.append(f": {words}" if words else "", FAINT)
             options.add_option(entry(text, disabled=bit.bit in self._parameter.reserved))
         options.highlighted = at
-        shown = f"16#{self._held:04X} → 16#{self._word:04X}"
+        shown = " → ".join(hexadecimal(self._parameter, raw) for raw in (self._held, self._word))
         self.query_one("#held", Plain).update(Text(shown, STRONG))
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:

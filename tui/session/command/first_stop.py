@@ -139,7 +139,8 @@ async def stop_first(
 async def _look(line: ModbusLine, device: int, place: StopPlace, *, again: bool) -> _Look:
     """Read the words that show if a drive is of these families, and that select its stop word."""
     raws: dict[int, int] = {}
-    there: bool | None = False
+    # without a status word to read, only a family that the user named is stopped
+    there: bool | None = False if place.status else None
     for address in place.status:
         try:
             raws[address] = await _read(line, device, address, again=again)

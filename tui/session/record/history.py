@@ -22,7 +22,7 @@ from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile, digest_of
 from tui.drive.profile.schema import Parameter
 from tui.drive.shown import depends_on
-from tui.drive.values import from_words, is_field, word_count
+from tui.drive.values import from_words, is_field, is_signed_type, word_count
 
 from .decoding import (
     NO_GOOD_REPLY,
@@ -253,7 +253,11 @@ def _reduced_point(row: ReducedWords, entry: Parameter, profile: Profile) -> Raw
         point.quality = WITHOUT_VALUE
         return point
     taught = profile.taught.get(entry.code)
-    signed = entry.type.startswith("int") or (taught is not None and taught.signed is True)
+    signed = is_signed_type(entry) or (taught is not None and taught.signed is True)
+    if entry.type == "float32":
+        # the ends of two registers are not those of a float
+        point.quality = NOT_KEPT
+        return point
     if count == 1:
         point.extent = words[0][signed]
         if is_field(entry):

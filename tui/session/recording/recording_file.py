@@ -69,7 +69,8 @@ def parameter_events(session: DriveSession, codes: Sequence[str]) -> list[EventR
         form = {
             "code": code, "name": parameter.name, "address": parameter.address,
             "function": parameter.function, "type": parameter.type, "unit": parameter.unit,
-            "scale": parameter.scale, "low_word_first": parameter.low_word_first,
+            "scale": parameter.scale, "offset": parameter.offset,
+            "low_word_first": parameter.low_word_first,
         }  # fmt: skip
         events.append(EventRow(*now, session.device, "parameter", json.dumps(form)))
     return events

@@ -120,7 +120,7 @@ def word_of(chart: Chart, state: State) -> int:
     others = 0
     for before in chart.states:
         others |= before.mask
-    bits = [1 << bit for bit in range(16) if others & ~state.mask & 1 << bit]
+    bits = [1 << bit for bit in range(32) if others & ~state.mask & 1 << bit]
     for count in range(1, MOST_CLEARED + 1):
         for chosen in combinations(bits, count):
             word = state.value | sum(chosen)

@@ -126,6 +126,8 @@ def to_raw(
 
     The default is the parameter's own scale, as from the factory.
     """
-    counts = Decimal(repr(float(value))) / (scale or Decimal(parameter.scale))
+    counts = (Decimal(repr(float(value))) - Decimal(parameter.offset)) / (
+        scale or Decimal(parameter.scale)
+    )
     low, high = type_range(parameter)
     return min(max(int(counts.to_integral_value(ROUND_HALF_UP)), low), high)

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.schema import Quantity
+from tui.drive.values import is_signed_type
 
 from ..body import Body
 from .motor import MotorState
@@ -110,7 +111,7 @@ def _show_speed(body: Body) -> None:
     if parameter is None:
         return
     rpm = body.motor.rotor * 120 / poles
-    signed = parameter.type.startswith("int")
+    signed = is_signed_type(parameter)
     if parameter.unit == "Hz":
         rpm = body.motor.rotor
     body.show("speed", rpm if signed else abs(rpm))

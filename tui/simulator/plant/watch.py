@@ -80,7 +80,7 @@ class SilenceWatch:
             return None
         raw = self._body.registers.in_force(parameter)
         off = 0 if self._data.off is None else self._data.off
-        return None if raw == off else raw * self._body.scale(parameter)
+        return None if raw == off else self._body.engineering(parameter)
 
     @property
     def watching(self) -> bool:

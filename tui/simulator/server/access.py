@@ -196,7 +196,8 @@ class DriveWords:
             return raw
         for code, bound in ((parameter.min_from, max), (parameter.max_from, min)):
             limit = self._registers.named(code) if code else None
-            if limit and (limit.unit, limit.scale) == (parameter.unit, parameter.scale):
+            same = (parameter.unit, parameter.scale, parameter.offset)
+            if limit and (limit.unit, limit.scale, limit.offset) == same:
                 raw = bound(raw, self._registers.present(limit))
         for of, bound in ((parameter.min_of, max), (parameter.max_of, min)):
             if of is not None and (counts := self._counts(parameter, of)) is not None:

@@ -48,9 +48,12 @@ def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield states that can never be reached."""
+    wide = {parameter.code for parameter in data.parameters if parameter.type.endswith("32")}
     for index, chart in enumerate(data.charts):
         for place, state in enumerate(chart.states):
             at: TomlPath = ("charts", index, "states", place)
+            if state.mask > 0xFFFF and chart.status not in wide:
+                yield at, f"chart {chart.id}: {chart.status} has 16 bits, its mask more."
             if state.value & ~state.mask:
                 yield (
                     at,
@@ -102,12 +105,15 @@ def whole_chart_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             found = parameters.get(code or "")
             if found is None:
                 continue
-            if found.type.endswith("32"):
+            status = place[-1] == "status"
+            if found.type.endswith("32") and not status:
                 yield (
                     place,
-                    f"chart {chart.id}: {found.code} has 32 bits. A command word or a status word"
-                    " has 16 bits; 32-bit ones are not supported.",
+                    f"chart {chart.id}: {found.code} has 32 bits. A command word has 16 bits. Name"
+                    " the register with the command bits only.",
                 )
+            elif not found.type.startswith("uint") and found.type != "int16":
+                yield place, f"chart {chart.id}: {found.code} is {found.type}. Use uint32."
             elif found.shift or found.mask != 0xFFFF:
                 yield (
                     place,

@@ -152,7 +152,8 @@ def full_scales(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         start = f"parameter {parameter.code}: its full scale {source.code}"
         if parameter.scale != "1" or parameter.scale_by is not None:
             yield at, f"parameter {parameter.code}: it has full_scale, so omit scale and scale_by."
-        if source.scale_source or source.unit_by is not None or source.access == "w":
+        bent = source.offset != "0" or source.scale.startswith("-")
+        if source.scale_source or source.unit_by or bent or source.access == "w":
             yield at, f"{start} must be readable, with a scale and a unit that never change."
         if not parameter.unit or parameter.unit != source.unit:
             own, other = parameter.unit or "none", source.unit or "none"

@@ -127,7 +127,7 @@ def _faults_of(
 ) -> Iterator[tuple[str, str]]:
     yield from _range_faults(parameter, enumerations)
     yield from _shape_faults(parameter)
-    if set(parameter.scale) <= {"0", "."}:
+    if not set(parameter.scale) & set("123456789"):
         yield "scale", "scale must not be 0."
     if parameter.enumeration and parameter.enumeration not in enumerations:
         known = ", ".join(enumerations) or "none"
@@ -194,10 +194,40 @@ def _shape_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
             yield "mask", "mask, shifted left by shift, exceeds bit 15 of the word."
         if parameter.mask & (parameter.mask + 1):
             yield "mask", "mask must be adjacent ones from bit 0, such as 1, 3, 7, 15."
+    if parameter.type == "float32" and _has_float_faults(parameter):
+        yield (
+            "type",
+            "a float32 has a resolution as its scale, such as 0.01, and neither bits, names,"
+            " scale_by nor full_scale.",
+        )
+    width = 32 if long else 16
+    for key, bits in (("bits", [b.bit for b in parameter.bits]), ("reserved", parameter.reserved)):
+        if bits and max(bits) >= width:
+            yield key, f"there is no bit {max(bits)} in {parameter.type}: 0 to {width - 1}."
+    if parameter.offset != "0" or parameter.scale.startswith("-"):
+        yield from _offset_faults(parameter)
     if parameter.function == 4 and parameter.access != "r":
         yield "function", "an input register (function 4) can only be read: access must be r."
     if parameter.address + (2 if long else 1) > 0x10000:
         yield "address", "exceeds address 65535."
+
+
+def _has_float_faults(parameter: Parameter) -> bool:
+    named = parameter.bits or parameter.values or parameter.enumeration
+    return bool(named or parameter.scale_source or parameter.scale == "1")
+
+
+def _offset_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
+    """Yield what contradicts an offset or a negative scale: it fits a plain measurement only."""
+    limited = parameter.min_from or parameter.max_from or parameter.min_of or parameter.max_of
+    if parameter.scale_source or limited:
+        yield (
+            "scale",
+            "an offset or a negative scale has neither scale_by, full_scale nor limits of other"
+            " parameters.",
+        )
+    if parameter.quantity in ("command_frequency", "command_speed"):
+        yield "scale", "a reference has neither an offset nor a negative scale."
 
 
 def _number_keys(key: str, names: dict[str, object] | dict[str, str]) -> Iterator[tuple[str, str]]:

@@ -17,6 +17,9 @@ DecimalText = Annotated[str, Meta(pattern=r"^[0-9]+(\.[0-9]+)?$")]
 SignedDecimalText = Annotated[str, Meta(pattern=r"^-?[0-9]+(\.[0-9]+)?$")]
 Identifier = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")]
 BitNumber = Annotated[int, Meta(ge=0, le=15)]
+LongBitNumber = Annotated[int, Meta(ge=0, le=31)]
+LongWord = Annotated[int, Meta(ge=0, le=0xFFFFFFFF)]
+"""The bits of one word or of two."""
 
 Confidence = Literal[
     "site", "manual", "manual+public", "public-x2", "public", "analogy", "unverified"
@@ -35,7 +38,7 @@ class When(Table, frozen=True, kw_only=True):
     """A condition on another parameter's raw value."""
 
     parameter: str
-    mask: WordAddress | None = None
+    mask: LongWord | None = None
     """Bits of the word that are evaluated; absent: all."""
     values: list[int]
 

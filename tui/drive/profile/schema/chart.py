@@ -6,7 +6,17 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import BitNumber, Confidence, Identifier, RawWord, Table, When, WordAddress
+from .base import (
+    BitNumber,
+    Confidence,
+    Identifier,
+    LongBitNumber,
+    LongWord,
+    RawWord,
+    Table,
+    When,
+    WordAddress,
+)
 
 StateKind = Literal[
     "starting", "blocked", "ready", "stopped", "running", "stopping", "fault", "unknown"
@@ -19,8 +29,8 @@ class State(Table, frozen=True, kw_only=True):
     id: Identifier
     name: str
     kind: StateKind
-    mask: WordAddress
-    value: WordAddress
+    mask: LongWord
+    value: LongWord
 
 
 class Transition(Table, frozen=True, kw_only=True):
@@ -39,7 +49,7 @@ class DirectionBit(Table, frozen=True, kw_only=True):
     """A status bit that shows the direction of rotation."""
 
     parameter: str
-    bit: BitNumber
+    bit: LongBitNumber
     reverse: Literal[0, 1] = 1
 
 
@@ -47,7 +57,7 @@ class StatusBit(Table, frozen=True, kw_only=True):
     """Status bit with its own meaning, and the value for which it applies."""
 
     parameter: str
-    bit: BitNumber
+    bit: LongBitNumber
     value: Literal[0, 1] = 1
 
 
@@ -104,7 +114,7 @@ class Interlock(Table, frozen=True, kw_only=True):
     """Condition of a command that can move the motor."""
 
     parameter: str
-    mask: WordAddress = 0xFFFF
+    mask: LongWord = 0xFFFF
     values: list[int]
     """Masked raw values with which the command is allowed."""
     orders: list[OrderId] = []

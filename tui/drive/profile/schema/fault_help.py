@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import BitNumber, RawWord, SignedDecimalText, Table, When, WordAddress
+from .base import LongBitNumber, RawWord, SignedDecimalText, Table, When, WordAddress
 from .parameter import Multiple
 
 HelpConfidence = Literal["manual", "public", "practice"]
@@ -114,7 +114,7 @@ class AlarmHelp(Hint, frozen=True, kw_only=True):
 
     word: str
     """The parameter that carries the bit."""
-    bit: BitNumber
+    bit: LongBitNumber
     name: str = ""
 
 

@@ -12,12 +12,14 @@ from .base import (
     DecimalText,
     Effective,
     Identifier,
+    LongBitNumber,
+    LongWord,
     SignedDecimalText,
     Table,
     WordAddress,
 )
 
-WordType = Literal["uint16", "int16", "uint32", "int32"]
+WordType = Literal["uint16", "int16", "uint32", "int32", "float32"]
 Access = Literal["r", "rw", "rw-stopped", "w"]
 Storage = Literal["ram", "eeprom", "ram-until-saved", "unknown"]
 
@@ -32,15 +34,15 @@ class Enumeration(Table, frozen=True, kw_only=True):
 class WordState(Table, frozen=True, kw_only=True):
     """The values of some bits of a word."""
 
-    mask: WordAddress
-    value: WordAddress
+    mask: LongWord
+    value: LongWord
     """The value of those bits."""
 
 
 class Bit(Table, frozen=True, kw_only=True):
     """One named bit of a word."""
 
-    bit: BitNumber
+    bit: LongBitNumber
     name: str
     off: str = ""
     on: str = ""
@@ -221,7 +223,9 @@ class Parameter(Table, frozen=True, kw_only=True):
     sure_up_to: int | None = None
     """Highest raw value with a certain meaning; higher ones are marked `?`."""
     unit: str = ""
-    scale: DecimalText = "1"
+    scale: SignedDecimalText = "1"
+    offset: SignedDecimalText = "0"
+    """Value at a raw value of 0, in the unit: -40 for a temperature that counts from there."""
     scale_by: ScaleBy | None = None
     full_scale: FullScale | None = None
     """Full scale from another parameter of the same unit; instead of `scale`."""
@@ -254,7 +258,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     values: dict[str, str] = {}
     """Names of raw values; for a number, of special values only."""
     bits: list[Bit] = []
-    reserved: list[BitNumber] = []
+    reserved: list[LongBitNumber] = []
     """Bits that must never be written as 1."""
     access: Access
     storage: Storage = "unknown"

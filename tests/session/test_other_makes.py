@@ -1,0 +1,145 @@
+"""Values as drives of other makes have them: floats, offsets, negative scales, words of 32 bits."""
+
+from __future__ import annotations
+
+import struct
+from decimal import Decimal
+
+import pytest
+from click.testing import CliRunner
+
+from tests.mixer import COMMAND, HERTZ, MIXER, installed_mixer
+from tui.cli.main import main
+from tui.drive.errors import ValueRefused
+from tui.drive.profile import library
+from tui.drive.settings.in_force import limits_in_force
+from tui.drive.shown import number_of, raw_of_text, shown
+from tui.drive.values import NOT_A_NUMBER, from_words, to_words
+from tui.simulator import DriveSpec, SimulatedDrive
+
+from .test_command import bench
+
+ROW = """
+[[parameters]]
+code = "{0}"
+name = "Word {0}"
+number = "4{1}"
+address = {2}
+group = "Settings"
+source = "guide"
+confidence = "manual"
+"""
+TEMP = ROW.format("TEMP", 300, 300) + 'access = "r"\nunit = "°C"\nscale = "0.5"\noffset = "-40"\n'
+SLIP = (
+    ROW.format("SLIP", 301, 301)
+    + 'access = "rw"\nunit = "%"\nscale = "-0.1"\nmin = 0\nmax = 500\nfactory = 0\n'
+)
+FLOW = (
+    ROW.format("FLOW", 302, 302) + 'access = "rw"\nunit = "m/s"\nscale = "0.01"\nmin = -500\n'
+    'max = 1000\nfactory = 0\ntype = "float32"\nlow_word_first = false\n'
+)
+ROWS = TEMP + SLIP + FLOW
+
+
+@pytest.mark.parametrize(
+    ("code", "raw", "text"),
+    [
+        ("TEMP", 0, "-40.0 °C"),
+        ("TEMP", 125, "22.5 °C"),
+        ("SLIP", 25, "-2.5 %"),
+        ("FLOW", -125, "-1.25 m/s"),
+        ("FLOW", NOT_A_NUMBER, "not a number"),
+    ],
+)
+def test_value_is_shown_with_its_offset_and_sign(code: str, raw: int, text: str) -> None:
+    profile = installed_mixer(more=ROWS)
+    assert shown(profile, profile[code], raw, {}).display == text
+
+
+def test_typed_value_with_an_offset_or_a_negative_scale_leads_to_its_count() -> None:
+    profile = installed_mixer(more=ROWS)
+    assert raw_of_text(profile, profile["TEMP"], "22.5", {}).raw == 125
+    assert raw_of_text(profile, profile["SLIP"], "-2.5", {}).raw == 25
+    with pytest.raises(ValueRefused, match=r"out of range, -50\.0 % to 0\.0 %"):
+        raw_of_text(profile, profile["SLIP"], "2.5", {})
+    limits = limits_in_force(profile, profile["SLIP"], {})
+    assert limits is not None
+    assert (limits.low, limits.high) == (Decimal("-50.0"), Decimal(0))
+    assert limits.step == Decimal("0.1")
+
+
+@pytest.mark.parametrize("number", [0.0, 12.5, -1.25, 9.99])
+def test_float_is_read_and_written_as_its_own_bits(number: float) -> None:
+    flow = installed_mixer(more=ROWS)["FLOW"]
+    words = struct.unpack(">HH", struct.pack(">f", number))
+    raw = from_words(flow, words)
+    assert raw == round(number * 100)
+    assert to_words(flow, raw) == words
+
+
+@pytest.mark.parametrize("number", [float("nan"), float("inf"), 3e9])
+def test_float_that_is_no_number_is_neither_shown_nor_written(number: float) -> None:
+    profile = installed_mixer(more=ROWS)
+    flow = profile["FLOW"]
+    raw = from_words(flow, struct.unpack(">HH", struct.pack(">f", number)))
+    assert raw == NOT_A_NUMBER
+    assert number_of(profile, flow, raw, {}) is None
+    with pytest.raises(ValueRefused):
+        to_words(flow, raw)
+
+
+def test_float_has_the_word_order_of_its_family() -> None:
+    order = ("\n[[charts]]", "\n[reading]\nlow_word_first = false\n\n[[charts]]")
+    rows = FLOW.replace("low_word_first = false\n", "")
+    assert not installed_mixer(HERTZ, rows, order)["FLOW"].low_word_first
+
+
+def test_float_too_fine_for_its_words_is_refused() -> None:
+    flow = installed_mixer(more=ROWS)["FLOW"]
+    assert to_words(flow, 1 << 24)
+    with pytest.raises(ValueRefused, match="cannot hold it exactly"):
+        to_words(flow, (1 << 30) + 1)
+
+
+def test_values_are_written_verified_and_backed_up_by_the_command_line() -> None:
+    installed_mixer(more=ROWS)
+    line = [f"sim:{MIXER}", "-p", MIXER]
+    wrote = CliRunner().invoke(main, ["write", *line, "FLOW=2.25", "SLIP=-2.5", "--arm"])
+    assert wrote.exit_code == 0, wrote.output
+    over = CliRunner().invoke(main, ["write", *line, "FLOW=10.01", "--arm"])
+    assert over.exit_code == 5, over.output
+    assert "-5.00 m/s to 10.00 m/s" in over.output
+    saved = CliRunner().invoke(main, ["backup", *line[:1], "-", *line[1:]])
+    assert saved.exit_code == 0, saved.output
+    assert "FLOW" in saved.output
+
+
+WIDE_STATUS = (
+    ("address = 100\n", 'address = 240\ntype = "uint32"\n'),
+    ("mask = 0x0002, value = 0x0002", "mask = 0x20000, value = 0x20000"),
+    ("mask = 0x0001, value = 0x0001", "mask = 0x10000, value = 0x10000"),
+)
+
+
+async def test_status_word_of_32_bits_shows_the_state_of_a_run_and_a_stop() -> None:
+    installed_mixer(HERTZ, "", *WIDE_STATUS)
+    async with bench(MIXER) as made:
+        assert made.session.state(60).kind == "ready"
+        made.commander.run("forward", "20Hz")
+        assert await made.done() == "Run: Running"
+        await made.let_go_until(lambda: made.drive.motor.frequency > 19)
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+        assert made.writes()[-1] == (COMMAND, 0)
+
+
+def test_bits_above_15_are_shown_with_all_their_digits() -> None:
+    bits = 'bits = [{ bit = 17, name = "Dry", alarm = true }]\n'
+    profile = installed_mixer(
+        more=ROW.format("WIDE", 310, 310) + f'access = "r"\ntype = "uint32"\n{bits}'
+    )
+    assert shown(profile, profile["WIDE"], 0x20001, {}).text == "16#00020001"
+    drive = SimulatedDrive(library.load(MIXER), DriveSpec(MIXER, 1, sets={"WIDE": 0x20001}))
+    assert drive.line_side.answer(1, struct.pack(">BHH", 3, 310, 2)) == struct.pack(
+        ">BBHH", 3, 4, 1, 2
+    )

@@ -1,0 +1,102 @@
+"""Raw values and the register words that hold them, both ways."""
+
+from __future__ import annotations
+
+import math
+import struct
+from collections.abc import Sequence
+from decimal import ROUND_HALF_UP, Decimal
+
+from .errors import ValueRefused
+from .profile.schema import Parameter
+
+NOT_A_NUMBER = -(1 << 31)
+"""Raw value of a float without a number, or outside the counts of its resolution."""
+
+
+def is_signed_type(parameter: Parameter) -> bool:
+    """Return True if the parameter's type has negative values."""
+    return not parameter.type.startswith("uint")
+
+
+def _float_counts(parameter: Parameter, raw: int) -> int:
+    """Return the counts of the parameter's resolution in the bits of a float."""
+    (number,) = struct.unpack(">f", raw.to_bytes(4, "big"))
+    if not math.isfinite(number):
+        return NOT_A_NUMBER
+    counts = int((Decimal(number) / Decimal(parameter.scale)).to_integral_value(ROUND_HALF_UP))
+    return counts if abs(counts) < -NOT_A_NUMBER else NOT_A_NUMBER
+
+
+def _float_bits(parameter: Parameter, raw: int) -> int:
+    """Return the bits of the float for counts of the parameter's resolution."""
+    packed = struct.pack(">f", float(raw * Decimal(parameter.scale)))
+    return int.from_bytes(packed, "big")
+
+
+def word_count(parameter: Parameter) -> int:
+    """Return the number of registers of the parameter: 1 or 2."""
+    return 2 if parameter.type.endswith("32") else 1
+
+
+def from_words(parameter: Parameter, words: Sequence[int]) -> int:
+    """Return the raw value in the parameter's registers, by its sign, word order and bits."""
+    if word_count(parameter) == 2:
+        low, high = words if parameter.low_word_first else reversed(words)
+        raw, width = (high << 16) | low, 32
+        if parameter.type == "float32":
+            return _float_counts(parameter, raw)
+    else:
+        raw, width = words[0] >> parameter.shift & parameter.mask, 16
+    if parameter.type.startswith("int") and raw >= 1 << (width - 1):
+        raw -= 1 << width
+    return raw
+
+
+def is_field(parameter: Parameter) -> bool:
+    """Return True if the parameter is only a part of the bits of its register."""
+    return parameter.shift != 0 or parameter.mask != 0xFFFF
+
+
+def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[int, ...]:
+    """Return the register words for a raw value; raises ValueRefused if it does not fit.
+
+    `held` is the present word of the drive. It is required for a field of a register, because the
+    other bits must be kept.
+    """
+    low, high = type_range(parameter)
+    if not low <= raw <= high:
+        raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
+    if word_count(parameter) == 1:
+        own = parameter.mask << parameter.shift
+        if held is None:
+            if is_field(parameter):
+                raise ValueRefused(
+                    f"{parameter.code} is a part of a word, and the other bits were not read."
+                )
+            held = 0
+        return (held & ~own & 0xFFFF | raw << parameter.shift & own,)
+    if parameter.type == "float32":
+        counts, raw = raw, _float_bits(parameter, raw)
+        if _float_counts(parameter, raw) != counts:
+            raise ValueRefused(f"{parameter.code}: a float of 32 bits cannot hold it exactly.")
+    pair = (raw & 0xFFFF, (raw >> 16) & 0xFFFF)
+    return pair if parameter.low_word_first else (pair[1], pair[0])
+
+
+def type_range(parameter: Parameter) -> tuple[int, int]:
+    """Return the lowest and highest raw value that the parameter's type can hold."""
+    width = 32 if parameter.type.endswith("32") else 16
+    if is_field(parameter):
+        return 0, parameter.mask
+    if parameter.type == "float32":
+        return NOT_A_NUMBER + 1, -NOT_A_NUMBER - 1
+    if parameter.type.startswith("int"):
+        return -(1 << (width - 1)), (1 << (width - 1)) - 1
+    return 0, (1 << width) - 1
+
+
+def hexadecimal(parameter: Parameter, raw: int) -> str:
+    """Return the word or words of a raw value in hexadecimal: 16#0237, 16#00010237."""
+    digits = 4 * word_count(parameter)
+    return f"16#{raw & (1 << 4 * digits) - 1:0{digits}X}"
