@@ -5,6 +5,7 @@ A pipe would block its reader forever, and a device such as /dev/zero would fill
 
 from __future__ import annotations
 
+import codecs
 import errno
 import os
 import stat
@@ -45,3 +46,24 @@ def read_small_text(path: Path, longest: int = LONGEST_TEXT) -> str:
     """Read a text file, with line ends as `\\n`. Raises OSError and UnicodeDecodeError."""
     text = read_small(path, longest).decode("utf-8")
     return text.replace("\r\n", "\n").replace("\r", "\n")
+
+
+def encoding_fault(data: bytes) -> str:
+    """Return the line of a text that is not plain UTF-8, and why; empty if it is.
+
+    Line ends may be those of Windows.
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        return "1: the file is UTF-16. Save it as UTF-8 without a byte order mark (BOM)."
+    if data.startswith(codecs.BOM_UTF8):
+        return "1: the file begins with a byte order mark (BOM). Save it as UTF-8 without BOM."
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        byte, line = data[error.start], data.count(b"\n", 0, error.start) + 1
+        sign = data[error.start : error.start + 1].decode("cp1252", errors="replace")
+        return (
+            f"{line}: byte 16#{byte:02X} is not UTF-8; in Latin-1 or Windows-1252 it is"
+            f" {sign!r}. Save the file as UTF-8."
+        )
+    return ""

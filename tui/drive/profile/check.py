@@ -11,6 +11,7 @@ import msgspec
 from tui.drive.sentences import sentence
 
 from ..errors import ProfileError
+from .address_rule import fill_addresses
 from .converting import converted
 from .form import form_faults, place_label
 from .rules import RULES
@@ -54,6 +55,9 @@ def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[Profi
     the panel. Raises ProfileError if the file cannot be read, or is not valid TOML.
     """
     sources = read_tables(path, packaged)
+    if by_rule := fill_addresses(sources.tables):
+        # without their addresses, every other check of these rows would be wrong
+        return None, _in_order(_placed(sources, by_rule))
     try:
         data: ProfileData = converted(sources.tables, ProfileData)
     except msgspec.ValidationError:

@@ -16,7 +16,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..errors import ProfileError
-from ..small_file import open_regular, read_small_text
+from ..small_file import encoding_fault, open_regular, read_small, read_small_text
 
 HEAD_BYTES = 4096
 """Most characters of a head."""
@@ -92,8 +92,8 @@ def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> Pro
         text = read_small_text(path)
     except OSError as error:
         return ProfileFileHead(fault=f"cannot be read: {error.strerror}")
-    except UnicodeDecodeError as error:
-        return ProfileFileHead(fault=f"byte {error.start} is not UTF-8 text")
+    except UnicodeDecodeError:
+        return ProfileFileHead(fault=f"{path}:{encoding_fault(read_small(path))}")
     head = section(text, "profile") or {}
     if not own and head and (count := _counted(text, head, packaged)) is not None:
         return ProfileFileHead(head, count)

@@ -245,7 +245,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
     "ParameterGroup": {"holds": "Content of the group: settings, commands or measurements."},
     "Parameter": {
         "name": "Short name without a unit.",
-        "address": "Wire address, as in a frame.",
+        "address": "Wire address, as in a frame, or a rule for it: 10 * number - 1.",
         "type": "Number of words, and signed or unsigned.",
         "unit": "Unit.",
         "scale": "Value of one count, a decimal in quotes.",
@@ -347,6 +347,17 @@ def profile_schema(form: str = "profile") -> dict[str, Any]:
         for field, shape in part.get("properties", {}).items():
             if text := field_text(table, field):
                 shape["description"] = text
+    if (parameter := parts.get("Parameter")) is not None:
+        # a file may have a rule instead, or leave it to the group or the profile
+        place = parameter["properties"]["address"]
+        parameter["properties"]["address"] = {
+            "anyOf": [
+                {key: place[key] for key in place if key != "description"},
+                {"type": "string"},
+            ],
+            "description": place["description"],
+        }
+        parameter["required"].remove("address")
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title,

@@ -16,7 +16,7 @@ from typing import Any
 import tomli
 
 from ..errors import ProfileError
-from ..small_file import read_small_text
+from ..small_file import encoding_fault, read_small, read_small_text
 from ..toml_text import toml_tables
 from .toml_lines import TomlPath, toml_lines
 
@@ -113,11 +113,12 @@ def read_tables(path: Path, packaged: Path) -> ProfileTables:
 def source_text(path: Path) -> SourceText:
     """Read a file; raises ProfileError."""
     try:
-        return SourceText(str(path), read_small_text(path))
+        data = read_small(path)
     except OSError as error:
         raise ProfileError(f"{path}: cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
+    if fault := encoding_fault(data):
+        raise ProfileError(f"{path}:{fault}")
+    return SourceText(str(path), read_small_text(path))
 
 
 def parsed(source: SourceText) -> dict[str, Any]:

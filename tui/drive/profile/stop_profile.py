@@ -84,7 +84,8 @@ def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:
     except (OSError, UnicodeDecodeError):
         return None
     head, rows = section(text, "profile"), section(text, "charts")
-    if not isinstance(head, dict) or not rows or "without" in head:
+    by_rule = '\naddress = "' in text
+    if not isinstance(head, dict) or not rows or "without" in head or by_rule:
         return None
     shared = shared_texts(head, path.parent) if "rows_from" in head else []
     if shared is None or any("[[charts]]" in item for item in shared):

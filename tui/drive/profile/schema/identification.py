@@ -36,6 +36,8 @@ class ProfileHead(Table, frozen=True, kw_only=True):
     summary: str = ""
     demo_hz: DecimalText | None = None
     """Frequency at which its motor runs in the demo; absent: it is not in the demo."""
+    address: str = ""
+    """Rule for the wire address of parameters without one: `10 * number - 1`."""
     rows_from: list[str] = []
     """Files of rows shared by several families, in the folder of this file; a row here with the
     same key contains the differences."""

@@ -198,6 +198,8 @@ class ParameterGroup(Table, frozen=True, kw_only=True):
     name: str
     """Name as in `group` of the parameters."""
     holds: Literal["settings", "commands", "measurements"] = "settings"
+    address: str = ""
+    """Rule for the wire address of its parameters without one: `256 * menu + item`."""
     needs_factory: str = ""
     """A word that shows the fitted option. The group is valid only while that word has its factory
     value, and is not written otherwise."""
