@@ -54,7 +54,7 @@ def encoding_fault(data: bytes) -> str:
     Line ends may be those of Windows.
     """
     if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
-        return "1: the file is UTF-16. Save it as UTF-8 without a byte order mark (BOM)."
+        return "1: the file is UTF-16, not UTF-8. Save it as UTF-8 without a byte order mark (BOM)."
     if data.startswith(codecs.BOM_UTF8):
         return "1: the file begins with a byte order mark (BOM). Save it as UTF-8 without BOM."
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -64,6 +65,13 @@ PARAMETER_COLUMNS = (
 )
 @click.option("--from", "origin", metavar="ID", help="Copy this profile; for new.")
 @click.option(
+    "--from-csv",
+    "table",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Begin with the parameters of this table; for new.",
+)
+@click.option(
     "-d",
     "--device",
     type=SLAVE_ADDRESS,
@@ -94,13 +102,15 @@ def profiles(
     device: int | None,
     to: Path | None,
     force: bool,
+    table: Path | None,
     schema: bool,
     wiring: bool,
     as_json: bool,
 ) -> None:
     """List the profiles, show one, check files, or create one of your own.
 
-    `path` shows the folder for your own profiles; `new NEW-ID --from ID` creates one there.
+    `path` shows the folder for your own profiles; `new NEW-ID --from ID` creates one there, and
+    `new NEW-ID --from-csv FILE` one from the parameter table of a manual.
     `confirm ID LINE` compares a drive with its profile and writes the result to a file. It only
     reads. A person is asked what the display shows, for each CODE or for the usual values.
     """
@@ -122,10 +132,10 @@ def profiles(
 
         say(schema_text().rstrip())
     elif words[:1] == ("new",):
-        _begin(words[1:], origin, as_json)
+        _begin(words[1:], origin, table and given_file(table), as_json)
     elif words[:1] == ("confirm",):
         _confirm(words[1:], device, to, force=force, as_json=as_json)
-    elif more or origin is not None:
+    elif more or origin is not None or table is not None:
         raise click.UsageError("Name one ID, or: profiles new NEW-ID --from ID.")
     elif profile_id == "path":
         _tell_folder(as_json)
@@ -195,25 +205,24 @@ def _tell_folder(as_json: bool) -> None:
         say(folder)
 
 
-def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
-    """Write the file of a new profile, a copy of another; never over a file."""
+def _begin(words: tuple[str, ...], origin: str | None, table: Path | None, as_json: bool) -> None:
+    """Write the file of a new profile, from another or from a table; never over a file."""
     from tui.drive.profile import library
-    from tui.drive.profile.new_file import new_profile_text
-    from tui.drive.small_file import read_small_text
 
     from ..documents.other_documents import ProfileBegun
     from ..shared.output import print_json
 
-    if len(words) != 1 or origin is None:
-        raise click.UsageError("Name the new id and the profile to copy: new NEW-ID --from ID.")
+    if len(words) != 1 or (origin is None) is (table is None):
+        raise click.UsageError(
+            "Name the new id and the profile to copy, new NEW-ID --from ID, or a table, new NEW-ID"
+            " --from-csv FILE."
+        )
     known = {listing.id: listing for listing in library.listings()}
-    library.load(origin)  # reports a broken profile, which cannot be copied
     new_id = words[0].strip()
     if new_id in known:
         raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")
-    source = known[origin.strip().lower()]
-    text = read_small_text(source.path)
-    text = new_profile_text(text, source.id, new_id, library.rows_with_shared(source))
+    text = _from_table(table, new_id) if table is not None else _copied(known, origin or "", new_id)
+    start = origin.strip().lower() if origin is not None else str(table)
     path = library.user_folder() / f"{new_id}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     try:
@@ -222,10 +231,42 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     except FileExistsError:
         raise click.UsageError(f"{path} already exists; nothing was written.") from None
     if as_json:
-        print_json(ProfileBegun(id=new_id, from_=source.id, file=str(path)))
+        print_json(ProfileBegun(id=new_id, from_=start, file=str(path)))
         return
     say(f"{path}")
-    say(f"It is a copy of {source.id}. Change it, then: drivepanel profiles --check {path}")
+    if table is not None:
+        say(f"Its rows are those of {start}, with the certainty unverified. Add the commands.")
+    else:
+        say(f"It is a copy of {start}. Change it.")
+    say(f"Then: drivepanel profiles --check {path}")
+
+
+def _copied(known: Mapping[str, Listing], origin: str, new_id: str) -> str:
+    """Return the text of a copy of a profile."""
+    from tui.drive.profile import library
+    from tui.drive.profile.new_file import new_profile_text
+    from tui.drive.small_file import read_small_text
+
+    library.load(origin)  # reports a broken profile, which cannot be copied
+    source = known[origin.strip().lower()]
+    rows = library.rows_with_shared(source)
+    return new_profile_text(read_small_text(source.path), source.id, new_id, rows)
+
+
+def _from_table(table: Path, new_id: str) -> str:
+    """Return the text of a profile with the rows of a table; a byte order mark is ignored."""
+    from tui.drive.profile.csv_file import profile_from_table
+    from tui.drive.small_file import encoding_fault, read_small
+
+    from ..shared.errors import USAGE, Failure
+
+    try:
+        data = read_small(table).removeprefix(b"\xef\xbb\xbf")
+    except OSError as error:
+        raise Failure(f"{table}: cannot be read: {error.strerror}.", USAGE) from error
+    if fault := encoding_fault(data):
+        raise Failure(f"{table}:{fault}", USAGE)
+    return profile_from_table(data.decode("utf-8"), new_id, str(table))
 
 
 def _list(as_json: bool) -> None:

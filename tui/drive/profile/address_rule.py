@@ -26,6 +26,7 @@ _OPERATIONS: Mapping[type[ast.operator], Callable[[int, int], int]] = {
     ast.Mod: operator.mod,
 }
 _HEXADECIMAL = re.compile(r"16#(?=[0-9A-Fa-f])")
+_NAMES = re.compile(r"[a-z_]")
 _PARTS = re.compile(r"(\d+)[-. ](\d+)")
 
 
@@ -107,7 +108,8 @@ def fill_addresses(tables: Mapping[str, Any]) -> list[tuple[TomlPath, str]]:
             and ((by_group.get(group) if isinstance(group, str) else None) or usual)
         )
         number = row.get("number")
-        if not isinstance(rule, str) or not isinstance(number, str):
+        if not isinstance(rule, str) or not isinstance(number, str) or not _NAMES.search(rule):
+            # an address in quotes is not a rule, but a mistake that the form check reports
             continue
         try:
             row["address"] = address_by_rule(rule, number)

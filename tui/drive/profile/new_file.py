@@ -48,7 +48,7 @@ def new_profile_text(
         text = _until_rows(text)
         for table in rows:
             text = re.sub(_OTHER_ROWS.format(table), "", text, flags=re.MULTILINE | re.DOTALL)
-        parts = [_row_text(table, row) for table, own in rows.items() for row in own]
+        parts = [row_as_toml(table, row) for table, own in rows.items() for row in own]
         text = f"{text}\n" + "\n".join(parts)
     return _PREFIXES.sub(
         '# beginnings of the reference that the drive reports, such as ["NEW12"]\n'
@@ -64,7 +64,8 @@ def _until_rows(text: str) -> str:
     return text[: first.start()] if first else text
 
 
-def _row_text(table: str, row: Mapping[str, Any]) -> str:
+def row_as_toml(table: str, row: Mapping[str, Any]) -> str:
+    """Return a row of a table as TOML text."""
     return "\n".join([f"[[{table}]]", *(f"{key} = {_written(row[key])}" for key in row), ""])
 
 

@@ -7,6 +7,7 @@ from decimal import Decimal
 from tui.drive.orders import last_word
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, ReferenceWay
+from tui.drive.shown import depends_on
 from tui.drive.values import raw_range
 
 from .proof_bench import ProofBench, Unproved
@@ -107,8 +108,7 @@ def present_number(bench: ProofBench, parameter: Parameter | None) -> float | No
 
 
 def present_scale(bench: ProofBench, parameter: Parameter) -> Decimal | None:
-    by = parameter.scale_by
-    return bench.profile.scale(parameter, bench.raws([by.parameter] if by else []))
+    return bench.profile.scale(parameter, bench.raws(depends_on(parameter)))
 
 
 def present_hertz(bench: ProofBench, parameter: Parameter | None) -> float | None:

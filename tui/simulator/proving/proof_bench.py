@@ -17,6 +17,7 @@ from tui.drive.orders import (
 )
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, State
+from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_field, to_words, word_count
 
 from ..drive import SimulatedDrive
@@ -55,7 +56,7 @@ class ProofBench:
             parameter = self.profile.quantity(quantity)
             if parameter is None or parameter.access == "r" or not parameter.unit:
                 continue
-            scale = self.profile.scale(parameter, self.raws(_scaled_by(parameter)))
+            scale = self.profile.scale(parameter, self.raws(depends_on(parameter)))
             if scale:
                 raw = max(int(RAMP_SECONDS / float(scale)), parameter.min or 0, 1)
                 self.drive.set(parameter.code, raw)
@@ -194,7 +195,3 @@ def _conditions(chart: Chart | None, order: Order | None) -> dict[str, int]:
 
 def _most(parameter: Parameter) -> int:
     return 0x7FFF if parameter.type == "int16" else 0xFFFFFFFF
-
-
-def _scaled_by(parameter: Parameter) -> tuple[str, ...]:
-    return (parameter.scale_by.parameter,) if parameter.scale_by else ()

@@ -1,0 +1,86 @@
+"""docs/own-drive.md leads from a table to a simulated motor that runs; tables with mistakes."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.session.test_command import bench
+from tui.drive.errors import ProfileError
+from tui.drive.profile import library
+from tui.drive.profile.csv_file import profile_from_table
+
+from .commands import ended
+
+GUIDE = (Path(__file__).parents[2] / "docs" / "own-drive.md").read_text("utf-8")
+
+
+def blocks(kind: str) -> list[str]:
+    return re.findall(rf"^```{kind}\n(.*?)^```$", GUIDE, re.MULTILINE | re.DOTALL)
+
+
+async def test_guide_leads_from_the_table_to_a_motor_that_runs(tmp_path: Path) -> None:
+    table = tmp_path / "my-drive.csv"
+    table.write_text(blocks("csv")[0], encoding="utf-8")
+    commands, scale = blocks("toml")
+    begun = ended(0, "profiles", "new", "my-drive", "--from-csv", table)
+    path = library.user_folder() / "my-drive.toml"
+    assert str(path) in begun.stdout
+    assert library.faults_of(path) == [], "valid from the first moment"
+    text = path.read_text("utf-8")
+    text = text.replace('code = "REF"\n', f'code = "REF"\n{scale}')
+    path.write_text(f"{text}\n{commands}", encoding="utf-8")
+    library.load.cache_clear()
+    ended(0, "profiles", "--check", path)
+    ended(0, "profiles", "--prove", path)
+    rows = {p.code: p for p in library.load("my-drive").parameters}
+    assert (rows["FMAX"].max, rows["FMAX"].factory, rows["ACC"].min) == (1200, 500, 1)
+    async with bench("my-drive") as made:
+        made.commander.run("forward", "20Hz")
+        assert await made.done() == "Run forward: Running"
+        assert made.writes() == [(101, 4000), (100, 1)]
+        await made.let_go_until(lambda: abs(made.drive.motor.frequency - 20) < 0.1)
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+
+
+@pytest.mark.parametrize(
+    ("table", "reason"),
+    [
+        ("code,name,limit\n", "t.csv:1: 'limit' is not a column."),
+        ("code,unit\n", "t.csv:1: it needs the columns code and name."),
+        ("code,name,min,minimum\n", "min occurs twice"),
+        ("code,name\n\n", "it has no line with a parameter"),
+        ("code,name,scale,max\nA,Ramp,0.1,1.25\n", "t.csv:2: A: max 1.25 is not a whole number"),
+        ("code,name,max\nA,Ramp,ten\n", "t.csv:2: A: max 'ten' is not a number"),
+        ("code,name,access\nA,Ramp,yes\n", "access 'yes' is not r, rw"),
+        ("code;name;values\nA;Mode;Off\n", "values 'Off' is not written as 0=Off"),
+        ("code,name\n,Ramp\n", "t.csv:2: a parameter needs a code and a name"),
+        ("code,name,function\nA,Ramp,5\n", "function '5' is not 3 or 4"),
+    ],
+)
+def test_table_with_a_mistake_is_refused_at_its_line(table: str, reason: str) -> None:
+    with pytest.raises(ProfileError, match=re.escape(reason)):
+        profile_from_table(table, "own", "t.csv")
+
+
+def test_table_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
+    """A byte order mark, semicolons, decimal commas, hexadecimal addresses, names of values."""
+    table = tmp_path / "t.csv"
+    table.write_text(
+        "Parameter;Description;Register;Resolution;Maximum;Values;Access\r\n"
+        "P1;Ramp;16#0101;0,1;12,5;;R/W\r\nP2;Mode;0102H;;;0=Off;rw\r\n"
+        "P3;Sum;0x103;;;;\r\n",
+        encoding="utf-8-sig",
+    )
+    ended(0, "profiles", "new", "own", "--from-csv", table)
+    rows = {p.code: p for p in library.load("own").parameters}
+    assert [rows[code].address for code in rows] == [0x101, 0x102, 0x103]
+    assert (rows["P1"].scale, rows["P1"].max, rows["P1"].access) == ("0.1", 125, "rw")
+    assert (dict(rows["P2"].values), rows["P3"].access) == ({"0": "Off"}, "r")
+    ended(2, "profiles", "new", "own", "--from-csv", table)
+    table.write_bytes("code,name\nA,Modèle\n".encode("latin-1"))
+    refused = ended(2, "profiles", "new", "own2", "--from-csv", table)
+    assert "t.csv:2: byte 16#E8 is not UTF-8" in refused.output

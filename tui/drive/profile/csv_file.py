@@ -1,0 +1,182 @@
+"""Text of a new profile from the parameter table of a manual, as a CSV file.
+
+The first line names the columns. Limits and factory settings are in the unit, as manuals print
+them, and become raw values by the scale of their row. Nothing is guessed: a cell that cannot be
+converted is an error with its line.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from collections.abc import Iterator, Mapping
+from decimal import Decimal, InvalidOperation
+from typing import Any
+
+from ..errors import ProfileError
+from ..plain import escaped_toml
+from .new_file import IDENTIFIER, row_as_toml
+
+COLUMNS: Mapping[str, str] = {
+    "code": "code", "parameter": "code",
+    "name": "name", "description": "name",
+    "number": "number", "no": "number", "address": "address", "register": "address",
+    "type": "type", "unit": "unit", "units": "unit", "scale": "scale", "resolution": "scale",
+    "offset": "offset", "min": "min", "minimum": "min", "max": "max", "maximum": "max",
+    "factory": "factory", "default": "factory", "values": "values", "access": "access",
+    "group": "group", "menu": "group", "storage": "storage", "quantity": "quantity",
+    "note": "note", "function": "function",
+}  # fmt: skip
+"""Field by heading, in small letters."""
+ACCESS: Mapping[str, str] = {
+    "": "r", "r": "r", "ro": "r", "r/o": "r", "read": "r",
+    "rw": "rw", "r/w": "rw", "rw-stopped": "rw-stopped", "w": "w", "wo": "w",
+}  # fmt: skip
+IN_UNIT = ("min", "max", "factory")
+_NAMED = re.compile(r"\s*(-?\d+)\s*[=:]\s*(.+?)\s*")
+_HEAD = """\
+[profile]
+id = "{id}"
+name = "{id}"
+vendor = "Unknown"
+version = "0.1"
+# address = "10 * number - 1"
+
+[[sources]]
+id = "table"
+title = "Parameter table of the manufacturer: write title and edition here"
+
+# The factory settings of the line: change them to those of the drive.
+[link]
+baud = 9600
+format = "8N1"
+
+[[functions]]
+code = 3
+name = "Read holding registers"
+max_read = 1
+
+[[functions]]
+code = 6
+name = "Write single register"
+{more}
+# Commands, states and references come here: see docs/own-drive.md.
+
+[monitoring]
+values = [{watched}]
+
+"""
+MOST_MONITORED = 8
+"""Values that a new profile monitors at most."""
+_FUNCTION = """
+[[functions]]
+code = {code}
+name = "{name}"
+{limit} = 2
+"""
+
+
+def profile_from_table(text: str, new_id: str, file: str) -> str:
+    """Return a profile with a row for each line of a table. Raises ProfileError."""
+    if not IDENTIFIER.fullmatch(new_id):
+        raise ProfileError(
+            f"{new_id!r} is not an id. Use small letters, digits, - and _, with a letter first."
+        )
+    rows = list(_rows(text, file))
+    if not rows:
+        raise ProfileError(f"{file}: it has no line with a parameter.")
+    more = ""
+    if any(row.get("function") == 4 for row in rows):
+        more += _FUNCTION.format(code=4, name="Read input registers", limit="max_read")
+    if any(str(row.get("type", "")).endswith("32") for row in rows):
+        more += _FUNCTION.format(code=16, name="Write registers", limit="max_write")
+    watched = [row["code"] for row in rows if "quantity" in row and row["access"] == "r"]
+    values = ", ".join(
+        f"{{ parameter = {escaped_toml(code)} }}" for code in watched[:MOST_MONITORED]
+    )
+    parts = (row_as_toml("parameters", row) for row in rows)
+    return _HEAD.format(id=new_id, more=more, watched=values) + "\n".join(parts)
+
+
+def _rows(text: str, file: str) -> Iterator[dict[str, Any]]:
+    first = text.partition("\n")[0]
+    separator = max(",;\t", key=first.count)
+    reader = csv.reader(io.StringIO(text), delimiter=separator)
+    headings = [cell.strip().casefold().rstrip(".") for cell in next(reader, [])]
+    fields = [COLUMNS.get(heading, "") for heading in headings]
+    unknown = [h for h, field in zip(headings, fields, strict=True) if h and not field]
+    twice = {field for field in fields if field and fields.count(field) > 1}
+    if unknown or twice or "code" not in fields or "name" not in fields:
+        names = ", ".join(dict.fromkeys(COLUMNS.values()))
+        if unknown:
+            raise ProfileError(f"{file}:1: {unknown[0]!r} is not a column. Columns: {names}.")
+        if twice:
+            raise ProfileError(f"{file}:1: the column {min(twice)} occurs twice.")
+        raise ProfileError(f"{file}:1: it needs the columns code and name. Columns: {names}.")
+    for cells in reader:
+        row = {f: c.strip() for f, c in zip(fields, cells, strict=False) if f and c.strip()}
+        if row:
+            try:
+                yield _converted(row)
+            except ValueError as error:
+                raise ProfileError(f"{file}:{reader.line_num}: {error}") from None
+
+
+def _converted(row: dict[str, str]) -> dict[str, Any]:
+    """Return the fields of a parameter in the order of a profile. Raises ValueError."""
+    if not row.get("code") or not row.get("name"):
+        raise ValueError("a parameter needs a code and a name.")
+    code, access = row["code"], row.get("access", "").casefold()
+    if access not in ACCESS:
+        raise ValueError(f"{code}: access {row['access']!r} is not r, rw, rw-stopped or w.")
+    found: dict[str, Any] = {"code": code, "name": row["name"], "number": row.get("number", code)}
+    if address := row.get("address"):
+        found["address"] = _address(address)
+    if function := row.get("function"):
+        if function not in ("3", "4"):
+            raise ValueError(f"{code}: function {function!r} is not 3 or 4.")
+        found["function"] = int(function)
+    found |= {f: row[f] for f in ("type", "unit") if f in row}
+    found |= {f: row[f].replace(",", ".") for f in ("scale", "offset") if f in row}
+    found |= {f: _counts(code, f, row, found) for f in IN_UNIT if f in row}
+    if values := row.get("values"):
+        found["values"] = _names(code, values)
+    found["access"] = ACCESS[access]
+    found |= {f: row[f] for f in ("storage", "quantity", "note") if f in row}
+    return {**found, "group": row.get("group", "Settings"), "source": "table",
+            "confidence": "unverified"}  # fmt: skip
+
+
+def _address(text: str) -> int | str:
+    """Return a wire address: 9001, 16#2329, 0x2329 or 2329H; any other text is a rule."""
+    plain = text.replace(" ", "")
+    if re.fullmatch(r"[0-9]+", plain):
+        return int(plain)
+    if match := re.fullmatch(r"(?:16#|0[xX])([0-9A-Fa-f]+)|([0-9A-Fa-f]+)[hH]", plain):
+        return int(match[1] or match[2], 16)
+    return text
+
+
+def _counts(code: str, field: str, row: Mapping[str, str], found: Mapping[str, Any]) -> int:
+    """Return a value in the unit as a raw value. Raises ValueError."""
+    try:
+        number = Decimal(row[field].replace(",", "."))
+        counts = (number - Decimal(found.get("offset", "0"))) / Decimal(found.get("scale", "1"))
+    except (InvalidOperation, ZeroDivisionError):
+        raise ValueError(f"{code}: {field} {row[field]!r} is not a number.") from None
+    if counts != counts.to_integral_value():
+        scale = found.get("scale", "1")
+        raise ValueError(f"{code}: {field} {row[field]} is not a whole number of steps of {scale}.")
+    return int(counts)
+
+
+def _names(code: str, text: str) -> dict[str, str]:
+    """Return the names of raw values: `0=Off; 1=On`. Raises ValueError."""
+    found = {}
+    for part in re.split(r"[;|]", text):
+        match = _NAMED.fullmatch(part)
+        if match is None:
+            raise ValueError(f"{code}: values {part.strip()!r} is not written as 0=Off; 1=On.")
+        found[match[1]] = match[2]
+    return found
