@@ -205,6 +205,16 @@ def test_existing_file_is_not_overwritten_without_force(tmp_path: Path) -> None:
     assert [p.name for p in tmp_path.iterdir() if p.is_file()] == ["pump.toml"]
 
 
+@pytest.mark.skipif(os.name != "posix", reason="needs a named pipe")
+def test_pipe_is_not_replaced_even_with_force(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    with pytest.raises(SetError, match="not a regular file"):
+        write_file(pipe, small(), force=True)
+    assert stat.S_ISFIFO(pipe.stat().st_mode)
+    assert [path.name for path in tmp_path.iterdir() if not path.is_dir()] == ["pipe"]
+
+
 def test_unusable_path_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SetError, match="cannot be written"):
         write_file(tmp_path / "no" / "pump.toml", small())

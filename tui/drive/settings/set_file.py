@@ -310,6 +310,8 @@ def write_file(
         raise FileThere(
             f"{path} already exists. Choose another name, or use --force to replace it."
         )
+    if path.exists() and not path.is_file():  # a device would be replaced by a file
+        raise SetError(f"{path} is not a regular file. Choose another name.")
     part = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
         flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_BINARY", 0)
