@@ -50,7 +50,7 @@ def written(path: Path, profile: str = "atv312", **raws: int) -> None:
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
-    written(tmp_path / "pumps.toml", ACC=40, dEC=50, HSP=500, Add=9, Inr=1, nCr=99)
+    written(tmp_path / "pumps.toml", ACC=40, dEC=50, HSP=500, Add=9, Inr=1, nCr=30)
     written(tmp_path / "pump-4.toml", dEC=30)
     path = tmp_path / "hall2.toml"
     path.write_text(LIST, "utf-8")

@@ -9,6 +9,8 @@ RESULT = "tests/session/test_acceptance_result.py"
 FILE = "tests/session/test_acceptance_file.py"
 COMMAND = "tests/cli/test_accept.py"
 
+PREDECESSOR = "tests/session/test_predecessor.py"
+
 DEFECTS = (
     Defect(
         "acceptance-without-a-person",
@@ -121,5 +123,48 @@ DEFECTS = (
         "    if False:\n",
         "A test file has a step without an end.",
         (FILE,),
+    ),
+    Defect(
+        "unlike-setting-carried-over",
+        "tui/drive/profile/schema/whole.py",
+        "        if code in self.unlike:\n",
+        "        if False:\n",
+        "A raw value whose unit no source gives is written to a replacement drive.",
+        (f"{PREDECESSOR}::test_settings_that_are_not_mapped_have_a_reason",),
+    ),
+    Defect(
+        "predecessor-of-another-machine",
+        "tui/session/settings/backups.py",
+        "            if known and line_key(head.line) == key:\n",
+        "            if known:\n",
+        "A drive is offered the settings of a drive of another machine.",
+        (f"{PREDECESSOR}::test_newest_backup_is_of_this_address",),
+    ),
+    Defect(
+        "newest-set-written-unseen",
+        "tui/cli/commands/restore.py",
+        "    if newest and not dry_run:\n",
+        "    if False:\n",
+        "The set of a predecessor is written before a person has seen the differences.",
+        ("tests/cli/test_replacement_command.py::test_newest_set_is_never_written_unseen",),
+    ),
+    Defect(
+        "motor-data-of-the-machine",
+        "tui/drive/settings/recipes.py",
+        "                sets[0] = _without(sets[0], others)\n",
+        "                pass\n",
+        "The motor data of one drive is written to a drive with another motor.",
+        ("tests/cli/test_recipes.py::test_recipes_are_restored_to_their_own_drives",),
+    ),
+    Defect(
+        "changed-settings-reported-as-unchanged",
+        "tui/session/stored_results.py",
+        "    return result.settings_hash_after == now\n",
+        "    return True\n",
+        "A customer signs a test that was carried out with other settings.",
+        (
+            "tests/session/test_report_page.py"
+            "::test_settings_that_changed_after_the_test_are_reported",
+        ),
     ),
 )
