@@ -65,8 +65,9 @@ def kept_line(view: TrendView, width: int) -> Text:
     if view.oldest is None:
         return Text("  Nothing is recorded of these drives.", FAINT, no_wrap=True)
     begin, end = view.oldest, max(view.now, view.oldest + 1)
-    hours = (end - begin) / 3600
-    length = f"{hours:.0f} h" if hours >= 2 else f"{hours * 60:.0f} min"
+    kept = end - begin
+    length = f"{kept / 3600:.0f} h" if kept >= 7200 else f"{kept / 60:.0f} min"
+    length = length if kept >= 120 else f"{kept:.0f} s"
     first = time.strftime("%m-%d %H:%M", time.localtime(begin))
     line = Text(f"  kept {length}  {first} ", FAINT, no_wrap=True)
     last = time.strftime(" %H:%M", time.localtime(end))
