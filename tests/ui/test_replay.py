@@ -211,3 +211,22 @@ async def test_markup_is_no_time_of_a_replay(run: Path) -> None:
             await made.pilot.press("enter", "escape")
             await made.until(lambda: not isinstance(made.app.screen, Ask))
         assert made.app.replay.clock.monotonic() == at
+
+
+async def test_trip_that_no_program_reported_is_an_event_to_go_to(tmp_path: Path) -> None:
+    profile = library.load("atv71")
+    rows = [
+        row(at, (word,), address=profile[code].address)
+        for at in range(60)
+        for code, word in (("ETA", 0x0637 if at < 40 else 0x0218), ("LFT", 0 if at < 41 else 9))
+    ]
+    about = '{"profile": "atv71", "hash": ""}'
+    path = record(tmp_path, *rows, events=(event(0, "profile", about, 1),))
+    async with replaying(path, 10) as made:
+        replay = made.app.replay
+        assert replay is not None
+        await made.until(lambda: bool(replay.events))
+        (found,) = replay.events
+        assert (found.utc, found.text) == (round((BEGIN + 40) * 1e6), "Tripped on OCF Overcurrent.")
+        await made.pilot.press("#")
+        await made.until(lambda: abs(replay.clock.monotonic() - BEGIN - 38) < 0.5)

@@ -106,7 +106,7 @@ class LineOwner(Panel):
         """
         from tui.session.events import EventLog
         from tui.session.fleet import Fleet
-        from tui.session.replay import UnwrittenJournal, pass_lead, take_drives
+        from tui.session.replay import UnwrittenJournal, add_trips, pass_lead, take_drives
 
         from .monitor.assembly import codes_beside
 
@@ -124,6 +124,9 @@ class LineOwner(Panel):
         if device is None and len(fleet.consoles) == 1:
             device = fleet.consoles[0].device
         await pass_lead(replay, fleet, device, monitor, self.period)
+        self.run_worker(
+            asyncio.to_thread(add_trips, replay, device), group="trips", exit_on_error=False
+        )
         return PanelLine(opened, fleet)
 
     def open_line_of(self, text: str) -> PanelLine | None:

@@ -6,10 +6,14 @@ import asyncio
 import json
 from collections.abc import Callable
 from contextlib import suppress
+from functools import lru_cache
+from operator import attrgetter
+from pathlib import Path
 from typing import NamedTuple
 
 from tui.bus.errors import LineError
 from tui.bus.expectation import IDENTIFY, REPORT_ID
+from tui.bus.model import LineStatus
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile, digest_of
@@ -22,6 +26,8 @@ from .fleet import Fleet
 from .journal import Entry, Journal
 from .reading import Origin, Reading
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
+from .record.runs import history_of, read_events
+from .record.schema import EventRow
 
 EXACT_LEAD = 60.0
 """Seconds before the time of a replay that pass as they were."""
@@ -36,6 +42,10 @@ OTHER_PROFILE = (
     " differently."
 )
 NO_PROFILE = "Drive {device}: {error} Its values are not shown."
+SAME_TRIP_WITHIN = 5_000_000
+"""Microseconds between a trip and the event by which a program reported it."""
+EVER = 4e9
+"""A time after all records, in seconds since 1970."""
 UNNAMED = "Drive {device}: the record does not name its profile. Its values are not shown."
 
 
@@ -115,6 +125,37 @@ def _means(profile: Profile) -> dict[tuple[int, int], bool]:
             signed = is_signed_type(parameter)
             found[parameter.function, parameter.address] = signed
     return found
+
+
+def add_trips(line: ReplayLine, device: int | None) -> None:
+    """Add the trips that only the words of the record show to its events; `device` is the first.
+
+    It reads files for a second a drive and day: in a thread that nobody waits for.
+    """
+    for each in sorted(line.devices, key=lambda item: item != device):
+        if line.state.status is LineStatus.CLOSED:
+            return
+        trips = _trips_of(tuple(line.files), each, named_profile(line, each).id)
+        known = [
+            event.utc for event in line.events if (event.device, event.kind) == (each, "fault")
+        ]
+        new = [
+            trip for trip in trips if all(abs(trip.utc - utc) > SAME_TRIP_WITHIN for utc in known)
+        ]
+        line.events = tuple(sorted((*line.events, *new), key=attrgetter("utc")))
+
+
+@lru_cache(maxsize=64)
+def _trips_of(files: tuple[Path, ...], device: int, profile: str) -> list[EventRow]:
+    found = history_of(read_events(files), device, profile, -EVER, EVER).trips
+    return [
+        EventRow(
+            round(trip.begun * 1e6), 0, device, "fault",
+            f"Tripped on {f'{trip.code} {trip.name}'.strip() or 'a fault'}.",
+        )
+        for trip in found
+        if trip.within is not None
+    ]  # fmt: skip
 
 
 def _take_known(line: ReplayLine, session: DriveSession) -> None:
