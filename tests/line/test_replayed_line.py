@@ -65,7 +65,7 @@ def test_replay_reports_errors_before_it_opens() -> None:
         ((str(path), "--at", "noon"), "'noon' is not a time"),
         ((str(path), "--at", "2001-01-01T10:00"), "outside the record"),
         ((str(path), "-d", "9"), "Drive 9 is not in the record. Its drives: 1."),
-        ((str(path.parent),), "is not a file"),
+        ((str(path.parent / "none"),), "is not a file"),
     ):
         done = drivepanel("replay", *arguments)
         assert (done.returncode, done.stdout) == (2, "")
