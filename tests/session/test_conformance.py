@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -22,6 +21,7 @@ from tui.drive.profile.evidence import (
     evidence_text,
     read_evidence,
     statement_of,
+    with_evidence,
 )
 from tui.drive.profile.example_frames import FramePair, example_frames_of
 from tui.drive.profile.json_schema import schema_text
@@ -143,37 +143,32 @@ def evidence(
     )
 
 
-def loaded_with(folder: Path, *known: ProfileEvidence) -> Parameter:
-    """The deceleration of the profile with evidence in the folder of this site."""
+def judged_by(folder: Path, *known: ProfileEvidence) -> Parameter:
+    """The deceleration of the profile with the evidence of a folder."""
     for number, each in enumerate(known):
         (folder / f"{number}.json").write_text(evidence_text(each))
-    library.load.cache_clear()
-    return library.load("atv21")["dEC"]
+    data = with_evidence(library.load("atv21").data, all_evidence(folder))
+    return next(p for p in data.parameters if p.code == "dEC")
 
 
 @pytest.fixture
-def site(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Iterator[Path]:
-    """The folder for evidence of this site; no profile of it stays loaded."""
-    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
-    folder = tmp_path / "evidence"
-    folder.mkdir()
-    yield folder
-    library.load.cache_clear()
-
-
-@pytest.fixture
-def statement(site: Path) -> str:
+def statement() -> str:
     """The statement about the deceleration, as a test writes it."""
-    library.load.cache_clear()
     profile = library.load("atv21")
     assert not is_verified(profile["dEC"])
     return statement_of(profile["dEC"], profile.names(profile["dEC"]).items())
 
 
 def test_evidence_of_a_real_drive_proves_a_parameter_on_this_site(
-    site: Path, statement: str
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, statement: str
 ) -> None:
-    proved = loaded_with(site, evidence("confirmed", statement))
+    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
+    library.evidence_folder().mkdir()
+    by_file = judged_by(library.evidence_folder(), evidence("confirmed", statement))
+    library.load.cache_clear()
+    proved = library.load("atv21")["dEC"]
+    library.load.cache_clear()
+    assert proved == by_file
     assert proved.confidence == "site"
     assert is_verified(proved)
     assert proved.source.endswith("; confirmed on ATV21H075M3X 1.2, 2026-03-01")
@@ -181,31 +176,33 @@ def test_evidence_of_a_real_drive_proves_a_parameter_on_this_site(
 
 @pytest.mark.parametrize("kind", ["simulated", "unknown"])
 def test_evidence_of_no_real_drive_proves_nothing(
-    site: Path, statement: str, kind: Literal["simulated", "unknown"]
+    tmp_path: Path, statement: str, kind: Literal["simulated", "unknown"]
 ) -> None:
-    assert not is_verified(loaded_with(site, evidence("confirmed", statement, kind)))
+    assert not is_verified(judged_by(tmp_path, evidence("confirmed", statement, kind)))
 
 
-def test_evidence_of_another_family_proves_nothing(site: Path, statement: str) -> None:
+def test_evidence_of_another_family_proves_nothing(tmp_path: Path, statement: str) -> None:
     other = msgspec.structs.replace(evidence("confirmed", statement), profile="atv71")
-    assert not is_verified(loaded_with(site, other))
+    assert not is_verified(judged_by(tmp_path, other))
 
 
 def test_evidence_about_a_statement_that_has_changed_proves_nothing(
-    site: Path, statement: str
+    tmp_path: Path, statement: str
 ) -> None:
     other = json.dumps([*json.loads(statement)[:1], 999, *json.loads(statement)[2:]])
-    assert not is_verified(loaded_with(site, evidence("confirmed", other)))
+    assert not is_verified(judged_by(tmp_path, evidence("confirmed", other)))
 
 
-def test_newest_evidence_counts_and_damaged_files_are_ignored(site: Path, statement: str) -> None:
-    (site / "a.json").write_text("{")
+def test_newest_evidence_counts_and_damaged_files_are_ignored(
+    tmp_path: Path, statement: str
+) -> None:
+    (tmp_path / "a.json").write_text("{")
     newer = evidence("contradicted", statement, date="2026-04-01T10:00:00+01:00")
-    lost = loaded_with(site, newer, evidence("confirmed", statement))
+    lost = judged_by(tmp_path, newer, evidence("confirmed", statement))
     assert lost.confidence == "unverified"
     assert "; contradicted on" in lost.source
     with pytest.raises(EvidenceError, match=r"a\.json: not evidence"):
-        read_evidence(site / "a.json")
+        read_evidence(tmp_path / "a.json")
 
 
 def test_profile_file_cannot_claim_to_be_proved_on_this_site(tmp_path: Path) -> None:
