@@ -192,6 +192,22 @@ def test_tap_links_of_a_box_share_their_length(
     assert [address for finding in found for address in finding.addresses] == broken
 
 
+def test_line_without_polarization_may_have_150_ohm_at_its_ends(written: Written) -> None:
+    text = line(station(1, terminator="R"), rp=0).replace('"RC"', '"R"')
+    plan = written(text)
+    assert (subjects(plan), subjects(plan, "warning")) == ([], ["Polarization"])
+    bare = line(station(1, terminator="none"), rp=0)
+    assert [f.text[-7:] for f in findings(written(bare)) if f.subject == "Termination"] == [
+        "Fit RC."
+    ]
+
+
+def test_line_without_a_profile_has_limits_that_are_marked(written: Written) -> None:
+    plan = written(line(station(1, profile="", polarization=0)))
+    assert [f.text[:33] for f in findings(plan, "note")] == ["No station has a profile. The lim"]
+    assert line_times(plan).timeouts == []
+
+
 WRONG_TERMINATION = {
     "none": (station(1, terminator="none"), "has no terminator. Fit RC."),
     "150 ohm": (station(1, terminator="R"), "is R. Fit RC."),
@@ -298,6 +314,12 @@ def test_diagram_has_every_element_and_marks_the_wrong_ones(written: Written) ->
     assert len([t for t in texts if t and t.startswith(("1  A", "2  B", "Master"))]) == 3
 
 
+def test_long_names_are_cut_in_the_diagram(written: Written) -> None:
+    plan = written(line(station(1, name="N" * 400), station(2)))
+    assert max(map(len, diagram_text(plan, []))) <= 80
+    assert f"{'N' * 27}…" in diagram_svg(plan, [])
+
+
 # The file
 
 
@@ -378,7 +400,10 @@ def test_plan_of_a_scan_can_be_read(tmp_path: Path) -> None:
     [
         ("", ": no drive of a scan."),
         ("{", ":1: not valid JSON."),
-        (scan_text({"device": "2"}), ":2: device: must be of type int."),
+        ("[" * 100_000, ":1: not valid JSON."),
+        (scan_text({"device": "2"}), ":2: device: must be an address, 0 to 247."),
+        (scan_text({"device": True}), ":2: device: must be an address, 0 to 247."),
+        (scan_text({"device": 248}), ":2: device: must be an address, 0 to 247."),
         ('{"command": "scan", "event": "ended"}', ": no drive of a scan."),
     ],
 )

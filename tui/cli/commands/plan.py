@@ -240,10 +240,12 @@ class PlanResult:
         return [*found, "  The line keeps the limits of the manuals."]
 
     def _cycle_lines(self) -> list[str]:
+        from tui.session.line_plan.drawing import short_name
+
         times = self.times
         rows = [
             f"  {item.station.address:>3}  requests {item.requests:>2}  words {item.words:>3}"
-            f"  {item.seconds * 1000:>6.1f} ms  {item.station.name}".rstrip()
+            f"  {item.seconds * 1000:>6.1f} ms  {short_name(item.station)}".rstrip()
             for item in times.stations
         ]
         bauds = ", ".join(f"{baud}: {s:.3f} s" for baud, s in times.by_baud.items())
@@ -255,17 +257,23 @@ class PlanResult:
         ]
 
     def _timeout_lines(self) -> list[str]:
+        from tui.session.line_plan.drawing import short_name
+
         times = self.times
         rows = [
             f"  {item.station.address:>3}  {item.parameter:<6} {_seconds(item.suitable)}"
-            f"  {item.station.name}".rstrip()
+            f"  {short_name(item.station)}".rstrip()
             for item in times.timeouts
         ]
         return [
             f"  The master waits {times.reply:g} s for a reply, and repeats a request twice.",
             f"  The longest pause in polling is {times.longest:.2f} s, while one device does not"
             " answer.",
-            "  Suitable communication timeouts, which outlast two such pauses:",
+            *(
+                ["  Suitable communication timeouts, which outlast two such pauses:"]
+                if rows
+                else []
+            ),
             *rows,
         ]
 

@@ -211,7 +211,7 @@ class _Checks:
         if not low <= re <= high:
             text = f"All polarization resistors give Re = {re:.0f} ohm, not {low} to {high}."
             yield self._finding("error", "Polarization", f"{text} {advice}", *polarized)
-        elif rp and best and re < FAR_FROM_BEST * (limits.best_ohm or 0):
+        elif rp and re < FAR_FROM_BEST * (limits.best_ohm or 0):
             text = f"All polarization resistors give Re = {re:.0f} ohm, which is allowed."
             yield self._finding("note", "Polarization", f"{text} {advice}")
         most, at = limits.most_polarized, limits.most_polarized_ohm
@@ -236,7 +236,9 @@ class _Checks:
 
     def terminators(self) -> Iterator[PlanFinding]:
         """Check the terminators: one of the right kind at each end, and none between."""
-        places, wanted = self.plan.places, self._terminator()
+        places, wanted = self.plan.places, self.limits.terminator
+        # without polarization, 150 ohm belongs at the ends
+        right = {wanted} if total_ohm(self.plan) is not None else {wanted, "R"}
         for number, place in enumerate(places):
             fitted = [item for item in place if item.terminator != "none"]
             name = all_of([element_text(item) for item in place])
@@ -251,13 +253,9 @@ class _Checks:
             elif len(fitted) > 1:
                 text = f"The end at {name} has {len(fitted)} terminators. Keep one."
                 yield self._finding("error", "Termination", text, *_stations(fitted))
-            elif fitted[0].terminator != wanted:
+            elif fitted[0].terminator not in right:
                 text = f"The terminator at {name} is {fitted[0].terminator}. Fit {wanted}."
                 yield self._finding("error", "Termination", text, *_stations(fitted))
-
-    def _terminator(self) -> str:
-        """Return the kind of terminator: without polarization always R."""
-        return self.limits.terminator if total_ohm(self.plan) is not None else "R"
 
     def addresses(self) -> Iterator[PlanFinding]:
         """Find addresses that do not select one drive."""
@@ -304,6 +302,9 @@ class _Checks:
         if stubs:
             text = f"The plan does not state the tap link (`stub`) of {_names(stubs)}."
             yield self._finding("note", "Tap links", text, *stubs, chapter=OWN_RULE)
+        if not plan.profiles:
+            text = f"No station has a profile. The limits of the {self.profile.name} are used."
+            yield self._finding("note", "Limits", text)
         for profile in plan.without_limits:
             text = (
                 f"No manual gives limits of the line for {profile.name}. Those of the"

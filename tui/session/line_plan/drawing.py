@@ -14,6 +14,7 @@ from .checks import PlanFinding, total_ohm
 from .plan_file import LinePlan, PlanMaster, PlanStation
 
 TERMINATOR_TEXTS = {"RC": "120 ohm + 1 nF", "R": "150 ohm"}
+NAME_ROOM = 28
 WIDTH, TOP, STEP = 900, 70, 46
 _TRUNK_X, _BOX_X, _BOX_WIDTH, _BOX_HEIGHT = 90, 250, 400, 32
 _INK, _FAINT, _WRONG, _MASTER = "#222222", "#666666", "#b3261e", "#1f5fa8"
@@ -56,12 +57,18 @@ def drawn_elements(plan: LinePlan, findings: list[PlanFinding]) -> list[DrawnEle
     return rows
 
 
+def short_name(item: PlanMaster | PlanStation) -> str:
+    """Return the name of an element, cut to a length that every drawing has room for."""
+    name = plain(item.name)
+    return name if len(name) <= NAME_ROOM else f"{name[: NAME_ROOM - 1]}…"
+
+
 def _label(plan: LinePlan, item: PlanMaster | PlanStation) -> str:
     if isinstance(item, PlanMaster):
-        return "  ".join(part for part in ("Master", item.name, item.kind) if part)
+        return "  ".join(part for part in ("Master", short_name(item), item.kind) if part)
     profile = plan.profile(item)
     kind = profile.name if profile else "other device"
-    return "  ".join(part for part in (str(item.address), item.name, kind) if part)
+    return "  ".join(part for part in (str(item.address), short_name(item), kind) if part)
 
 
 def _stub(item: PlanMaster | PlanStation) -> str:
@@ -74,7 +81,7 @@ def _notes(plan: LinePlan, item: PlanMaster | PlanStation) -> str:
     ohm = plan.ohm(item)
     parts = [f"2 x {ohm} ohm" if ohm else "", TERMINATOR_TEXTS.get(item.terminator, "")]
     if isinstance(item, PlanStation) and item.box:
-        parts.append(f"box {item.box}")
+        parts.append(f"box {item.box[:NAME_ROOM]}")
     return ", ".join(part for part in parts if part)
 
 

@@ -11,6 +11,8 @@ from tui.drive.errors import DriveError
 from tui.drive.plain import escaped_toml
 from tui.drive.small_file import read_small_text
 
+HIGHEST = 247
+
 
 class NotAScan(DriveError):
     """A file without the result of a scan; the text has its name and line."""
@@ -24,8 +26,9 @@ def plant_of_scan(path: Path) -> str:
         if row.get("command") != "scan" or row.get("event") not in ("hit", "ended"):
             continue
         if row["event"] == "hit":
-            if not isinstance(row.get("device"), int):
-                raise NotAScan(f"{path}:{number}: device: must be of type int.")
+            device = row.get("device")
+            if type(device) is not int or not 0 <= device <= HIGHEST:
+                raise NotAScan(f"{path}:{number}: device: must be an address, 0 to {HIGHEST}.")
             hits.append(row)
         name = str(row.get("line") or name)
     if not hits:
@@ -47,7 +50,7 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
             continue
         try:
             row = json.loads(line)
-        except ValueError as error:
+        except (ValueError, RecursionError) as error:
             raise NotAScan(f"{path}:{number}: not valid JSON.") from error
         if isinstance(row, dict):
             yield number, row
