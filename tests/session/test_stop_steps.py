@@ -17,6 +17,7 @@ from tui.session.command import last_known, motor_stop
 from tui.session.command.last_known import run_by_others
 from tui.session.command.motor_stop import FirstWave, MotorStop
 from tui.session.command.stop_report import Phase, not_proved, not_stopped
+from tui.session.connect.limits import limits_of
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.settings.write import Writer
@@ -179,6 +180,70 @@ async def test_word_keeps_option_bits_only_of_a_known_word(
     await here.stop._send(CHART, RAMP_STOP)
     assert here.written == [5, 0x0800, 0x0800], "the word before the stop"
     assert PROFILE["CMD"].address == COMMAND
+
+
+class Passed(FirstWave):
+    """A wave that notes which drives have passed it."""
+
+    def __init__(self) -> None:
+        super().__init__([1, 2])
+        self.devices: list[int] = []
+
+    def passed(self, device: int) -> None:
+        self.devices.append(device)
+
+
+FAMILIES: Any = [SimpleNamespace(id="one"), SimpleNamespace(id="another")]
+
+
+@pytest.mark.parametrize(
+    ("sent", "taken", "answered", "why"),
+    [
+        (True, "word", True, None), (True, None, True, "it took no stop word."),
+        (True, None, False, "it did not answer."), (False, None, False, "it did not answer."),
+    ],
+)  # fmt: skip
+async def test_drive_of_unlike_families_is_sent_the_word_that_stops_them_all(
+    sent: bool, taken: object, answered: bool, why: str | None, journal: Journal,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    wave, calls = Passed(), []
+    here = OneStop(Ramp(OwnTime(), 0.0), journal, wave=wave)
+    here.session.image.confirm("CHCF", 1, 999.0)
+
+    async def first(*of: object) -> Any:
+        calls.append(of)
+        return SimpleNamespace(sent=(1,) * sent, taken=taken, answered=answered)
+
+    monkeypatch.setattr(motor_stop, "unlike_families", lambda _: FAMILIES)
+    monkeypatch.setattr(motor_stop, "stop_first", first)
+    assert await here.stop.carry_out() == why
+    assert calls == [(here.drive, 1, journal, FAMILIES, ["one", "another"], "stop")]
+    assert (here.drive.limits[1], wave.devices) == (limits_of(PROFILE), [1])
+    assert (here.stop.begun, here.stop.sent, here.stop.taken) == (True, sent, bool(taken))
+    assert here.session.reported_by_line
+    assert here.reports == ([(Phase.FAILED, not_proved(), 1000.0)] if taken else [])
+    assert ("CHCF" in here.session.image.trusted) is not bool(taken)
+    assert here.written == []
+
+
+async def test_drive_of_unlike_families_that_fails_does_not_hold_up_the_others(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wave = Passed()
+    here = OneStop(Ramp(OwnTime(), 0.0), journal, wave=wave)
+
+    async def first(*_: object) -> None:
+        raise NoAnswer(1, 3, 1)
+
+    monkeypatch.setattr(motor_stop, "unlike_families", lambda _: FAMILIES)
+    monkeypatch.setattr(motor_stop, "stop_first", first)
+    with pytest.raises(NoAnswer):
+        await here.stop.carry_out()
+    assert (here.drive.limits[1], wave.devices) == (limits_of(PROFILE), [1])
+    assert await here.stop.follow() is None
+    assert here.reports == [(Phase.FAILED, not_proved(), 1000.0)]
+    assert here.stop.sent, "in another way"
 
 
 # -- what follows the word -------------------------------------------------------------------------
