@@ -8,6 +8,7 @@ from typing import Any, cast
 import pytest
 
 from tui.bus.errors import LineClosed
+from tui.drive.profile import library
 from tui.session.command import stop as stops
 from tui.session.command.stop import STOP_WAITS, Stopper
 from tui.session.command.stop_report import Phase
@@ -199,3 +200,27 @@ async def test_phases_of_a_stop_are_in_the_log(
     stopper = Stopper(drive, journal)
     stopper._say(DriveSession(drive, 4, PROFILE, clock=drive.clock), Phase.FAILED, "why", 990.0)
     assert "stop of device 4: failed, why" in caplog.text
+
+
+def test_stops_of_several_threads_begin_one_after_another(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = Begun(journal, monkeypatch)
+    locked: list[bool] = []
+    begin, load = here.stopper._begin, library.load
+
+    def begins(*of: Any) -> Any:
+        locked.append(here.stopper._lock.locked())
+        return begin(*of)
+
+    def loads(family: str) -> Any:
+        locked.append(here.stopper._lock.locked())
+        return load(family)
+
+    cast(Any, here.stopper)._begin = begins
+    wrong = session_of("powerdrive", "atv71", own="atv71", reference="ATV71HU15M3")
+    monkeypatch.setattr(library, "load", loads)
+    here.stopper.stop([here.session()])
+    here.stopper._by_its_own(wrong)
+    assert locked == [True, True]
+    assert not here.stopper._lock.locked()

@@ -51,6 +51,7 @@ def counts_of(counts: EepromCounts, drive: str = "A", device: int = 2) -> DriveC
         ("atv71", "SCS", 0, ""),
         ("atv71", "ACC", 30, ""),
         ("atv31", "SCS", 2, "save"),
+        ("atv31", "SCS", 3, ""),
         ("atv31", "CMI", 0x0002, "save"),
         ("atv21", "ACC", 30, "write"),
         ("atv21", "FA00", 0xC400, ""),
