@@ -8,7 +8,7 @@ import pytest
 
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
-from tui.screens.parameters.set_keys import Skipped
+from tui.screens.parameters.set_keys import Skipped, about_set
 
 from .test_command_flows import Bench, bench, writes
 from .test_flows import until
@@ -43,7 +43,9 @@ async def test_replacement_is_offered_and_nothing_is_written(
     async with bench("atv312") as made:
         await event(made, "may be new: 3 of 3 settings", "2026-11-20 10:00", "Press Ctrl+D")
         await made.pilot.press("2", "ctrl+d")
-        await event(made, "old.toml: 4 can be staged")
+        await event(made, "old.toml: 4 can be staged", "Rating: the same model.")
+        about = about_set(found[0], library.load("atv312"), {})
+        assert (about.reported, about.alarm) == ("predecessor", False)
         await event(made, "Predecessor: Altivar 31, ATV31HU09M3", "Firmware: another version")
         await event(made, "drivepanel accept")
         assert len(made.app.chosen.editor.staging.edits) == 0  # type: ignore[union-attr]

@@ -87,6 +87,10 @@ def about_set(path: Path, profile: Profile, raws: Mapping[str, int]) -> FileAbou
     named = head.identity.get("name") or head.family or head.profile
     drive = f"{head.device:>2} {named}" if head.device else named
     if head.profile != profile.id:
+        from tui.drive.settings.replacement import predecessor_families
+
+        if head.profile in predecessor_families(profile):
+            return FileAbout(drive, "predecessor")
         return FileAbout(drive, "other family", alarm=True)
     known = [code for code in values.raws if code in raws and profile.get(code)]
     different = [code for code in known if raws[code] != values.raws[code]]
@@ -317,16 +321,17 @@ class SetKeys(ParameterKeys):
         if not editor.other:
             editor.other = {"": 0}
         writes, skips = plan.count("write"), plan.count("skip")
-        self._report_predecessor()
-        self.note(
-            difference_text(editor.other_label, writes, plan.count("equal"), skips),
-            "Press i to stage." if writes else "",
-        )
+        rating = self._report_predecessor()
+        found = difference_text(editor.other_label, writes, plan.count("equal"), skips)
+        self.note(f"{found} {rating}".rstrip(), "Press i to stage." if writes else "")
         self.listed.choose(Choice("differs"))
         self.clear_search()
 
-    def _report_predecessor(self) -> None:
-        """Add how rating and firmware compare, if the set is of another drive at this address."""
+    def _report_predecessor(self) -> str:
+        """Report how rating and firmware compare, if the set is of another drive at this address.
+
+        Return the sentence about the rating; empty for a set of this drive.
+        """
         from tui.drive.profile import library
         from tui.drive.settings.replacement import identity_lines, is_of_another_drive
         from tui.session.read.upload import head_of
@@ -338,6 +343,8 @@ class SetKeys(ParameterKeys):
             held = self.editor.values.raws
             rows = identity_lines(session.profile, now, held, old, source)
             self.note(" ".join((*rows, TEST_AFTERWARDS)))
+            return rows[2]
+        return ""
 
     def action_stage_set(self) -> None:
         """Stage the differences of the set; nothing is written."""
