@@ -17,6 +17,8 @@ TREND_SECONDS = 62.0
 FAULT_CODE = "ObF"
 NO_SEARCH = ["backspace"] * 4
 MARKED = [*["left"] * 32, "M", *["right"] * 20, "M", *["left"] * 8]
+TO_NAMEPLATE = 10
+"""Steps of the start-up before the nameplate of the motor."""
 STEPS: tuple[tuple[list[str], float, str], ...] = (
     (["8"], 5.0, ""),
     (MARKED, 2.0, "trend"),
@@ -37,6 +39,9 @@ STEPS: tuple[tuple[list[str], float, str], ...] = (
     (["enter", "down", "enter", *"uln"], 0.5, ""),
     (["enter"], 1.0, "blocks"),
     (["u", "escape"], 0.5, ""),
+    (["B"], 2.0, ""),
+    (["tab"] * TO_NAMEPLATE, 2.5, "start-up"),
+    (["escape"], 0.5, ""),
 )
 """Keys pressed on Monitor, the seconds to wait, and the name of the picture taken then."""
 

@@ -20,6 +20,7 @@ from .test_flows import shown, until
 def no_ports(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path))
+    monkeypatch.chdir(tmp_path)  # of backups and reports
 
 
 async def start_up(made: Bench, step: str = "") -> StartUp:
@@ -59,7 +60,7 @@ async def row(made: Bench, opened: StartUp, kind: str) -> None:
 async def test_number_of_the_nameplate_is_proposed_and_only_staged() -> None:
     async with bench("atv71") as made:
         opened = await start_up(made, "Nameplate")
-        assert "drive" not in shown(made.app, "steps").split("UNS on the")[1].split("\n")[0]
+        assert "drive" not in shown(made.app, "steps").split("UNS on")[1].split("\n")[0]
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
         await made.pilot.pause(0.4)
@@ -141,7 +142,7 @@ async def test_changed_settings_are_named_after_a_lost_line() -> None:
 @pytest.mark.sweep
 @pytest.mark.parametrize("family", ["atv21", "atv312", "atv71", "powerdrive"])
 async def test_no_row_of_any_step_writes_or_moves_a_motor(family: str) -> None:
-    """Armed; each row gets Enter twice, then y and the digit of a typed answer."""
+    """Armed; each row gets Enter three times, then the keys that would run the motor on Monitor."""
     async with bench(family) as made:
         await made.armed()
         opened = await start_up(made)
@@ -157,6 +158,8 @@ async def test_no_row_of_any_step_writes_or_moves_a_motor(family: str) -> None:
                 await made.pilot.press("enter")
                 await made.pilot.pause(0.05)
                 await made.pilot.press("enter")
-                await made.pilot.press("r", "enter")  # as on Monitor, all in one
+                await made.pilot.press("enter")
+                if made.app.place != "monitor":  # there they are the way to run it
+                    await made.pilot.press("r", "enter")
                 assert writes(made.app) == [], (step.step, number)
                 assert made.speed() == 0

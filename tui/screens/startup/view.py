@@ -40,14 +40,15 @@ STEP_SIGNS: Mapping[str, tuple[str, Style]] = {
 STEPS_WIDTH, RESULT_WIDTH = 24, 18
 """Columns of the steps; columns of each one's result on a wide screen."""
 RESULTS_FROM = 110
-LABEL_WIDTH, VALUE_ROOM = 26, 14
-"""Columns of a usual label; least columns beside a longer one."""
+LABEL_WIDTH, VALUE_ROOM, NAME_WIDTH = 19, 14, 19
+"""Columns of a usual label, the least beside a longer one, and those of a parameter's name."""
 RESULT_LABELS = {
     "done": "Done: go to the next step",
     "deficient": "Deficiency ...",
     "skip": "Skip with a reason ...",
 }
 ACTION_LABELS = {
+    "reference": "Reference on plate",
     "run": "Run the motor",
     "test": "Test the timeout",
     "save": "Save to EEPROM",
@@ -247,7 +248,7 @@ def _row(view: StartUpView, row: StepRow, width: int, chosen: bool) -> Text:
 
 def _label(view: StartUpView, row: StepRow) -> str:
     if row.kind == "plate":
-        return f"{row.key} on the nameplate"
+        return f"{row.key} on nameplate"
     if row.kind == "speed":
         return f"At {row.key}"
     if row.kind == "stop":
@@ -257,7 +258,7 @@ def _label(view: StartUpView, row: StepRow) -> str:
 
 def _parameter(view: StartUpView, code: str, width: int) -> Text:
     name = view.profile[code].name
-    text = Text(f"{code:<6}", STRONG).append(f" {cut(name, LABEL_WIDTH - 7)} ", PLAIN)
+    text = Text(f"{code:<6}", STRONG).append(f" {cut(name, NAME_WIDTH)} ", PLAIN)
     text.append_text(_value(view, code))
     if code in view.staged:
         text.append(f"  staged {view.staged[code]}", ATTENTION)
