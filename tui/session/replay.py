@@ -128,11 +128,12 @@ def _means(profile: Profile) -> dict[tuple[int, int], bool]:
 
 
 def add_trips(line: ReplayLine, device: int | None) -> None:
-    """Add the trips that only the words of the record show to its events; `device` is the first.
+    """Add the trips of `device` that only the words of the record show to its events.
 
-    It reads files for a second a drive and day: in a thread that nobody waits for.
+    Without a device, those of some drives. It reads files for a second a drive and day: in a thread
+    that nobody waits for.
     """
-    for each in sorted(line.devices, key=lambda item: item != device):
+    for each in line.devices[:MONITORED_IN_LEAD] if device is None else (device,):
         if line.state.status is LineStatus.CLOSED:
             return
         trips = _trips_of(tuple(line.files), each, named_profile(line, each).id)
