@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import Any, cast
 
+import msgspec
 import pytest
 
 from tui.drive.channel import UNKNOWN_CHANNEL, Channel, command_channel
@@ -18,7 +19,7 @@ from tui.drive.chart import (
     state_now,
     watched_codes,
 )
-from tui.drive.orders import stop_alike, with_options
+from tui.drive.orders import order_target, stop_alike, with_options
 from tui.drive.profile import library
 from tui.drive.profile.schema import (
     ChannelBits,
@@ -200,3 +201,11 @@ def test_word_keeps_its_option_bits_and_zero_stays_zero() -> None:
     assert with_options(chart, order, {}) == [7, 0, 0xFFFF]
     order.parameter = "another"
     assert with_options(chart, order, {"command": 0xFFFF, "another": 0xFFFF}) == [7, 0, 0xFFFF]
+
+
+def test_words_of_a_command_go_to_its_own_register_or_that_of_the_chart() -> None:
+    profile, chart = library.load("atv312"), library.load("atv312").data.charts[0]
+    order = chart.orders[0]
+    assert order_target(profile, chart, order).code == chart.command
+    own = msgspec.structs.replace(order, parameter="LFr")
+    assert order_target(profile, chart, own).code == "LFr"

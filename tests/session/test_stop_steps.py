@@ -74,6 +74,9 @@ async def test_conditions_of_a_stop_are_read_with_the_priority_of_stops(journal:
     here = OneStop(drive, journal)
     await here.stop._read_anew(["CHCF", "ETA", "CHCF"])
     assert set(drive.priorities) == {Priority.STOP}
+    drive.priorities.clear()
+    await here.stop._motion(CHART)
+    assert set(drive.priorities) == {Priority.OPERATOR_READ}, "a stop of another drive is first"
     before = len(drive.priorities)
     await here.stop._read_anew(["CHCF"])
     assert len(drive.priorities) == before, "just read"
