@@ -58,6 +58,10 @@ async def test_guide_leads_from_the_table_to_a_motor_that_runs(tmp_path: Path) -
         ("code,name,access\nA,Ramp,yes\n", "access 'yes' is not r, rw"),
         ("code;name;values\nA;Mode;Off\n", "values 'Off' is not written as 0=Off"),
         ("code,name\n,Ramp\n", "t.csv:2: a parameter needs a code and a name"),
+        ("code,name,scale,max\nA,Ramp,0,1,50\n", "t.csv:2: it has more cells than the first line"),
+        ("code,name,max\nA,Ramp,1e999999\n", "max '1e999999' is not a number"),
+        ("code,name,max\nA,Ramp,inf\n", "max 'inf' is not a number"),
+        (f"code,name\nA,{'x' * 200_000}\n", "t.csv:2: it is not a table"),
         ("code,name,function\nA,Ramp,5\n", "function '5' is not 3 or 4"),
     ],
 )

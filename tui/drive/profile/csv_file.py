@@ -33,6 +33,8 @@ ACCESS: Mapping[str, str] = {
     "": "r", "r": "r", "ro": "r", "r/o": "r", "read": "r",
     "rw": "rw", "r/w": "rw", "rw-stopped": "rw-stopped", "w": "w", "wo": "w",
 }  # fmt: skip
+MOST_DIGITS = 12
+"""Most digits of a raw value, so that an absurd exponent takes no time."""
 IN_UNIT = ("min", "max", "factory")
 _NAMED = re.compile(r"\s*(-?\d+)\s*[=:]\s*(.+?)\s*")
 _HEAD = """\
@@ -100,9 +102,20 @@ def profile_from_table(text: str, new_id: str, file: str) -> str:
 
 
 def _rows(text: str, file: str) -> Iterator[dict[str, Any]]:
+    reader = csv.reader(io.StringIO(text), delimiter=_separator(text))
+    try:
+        yield from _rows_of(reader, file)
+    except csv.Error as error:
+        raise ProfileError(f"{file}:{reader.line_num}: it is not a table: {error}.") from None
+
+
+def _separator(text: str) -> str:
+    """Return the most frequent separator of the first line."""
     first = text.partition("\n")[0]
-    separator = max(",;\t", key=first.count)
-    reader = csv.reader(io.StringIO(text), delimiter=separator)
+    return max(",;\t", key=first.count)
+
+
+def _rows_of(reader: Any, file: str) -> Iterator[dict[str, Any]]:
     headings = [cell.strip().casefold().rstrip(".") for cell in next(reader, [])]
     fields = [COLUMNS.get(heading, "") for heading in headings]
     unknown = [h for h, field in zip(headings, fields, strict=True) if h and not field]
@@ -115,12 +128,19 @@ def _rows(text: str, file: str) -> Iterator[dict[str, Any]]:
             raise ProfileError(f"{file}:1: the column {min(twice)} occurs twice.")
         raise ProfileError(f"{file}:1: it needs the columns code and name. Columns: {names}.")
     for cells in reader:
+        line = reader.line_num
+        if len(cells) > len(fields):
+            # a decimal comma without quotes has moved the cells behind it into other columns
+            raise ProfileError(
+                f"{file}:{line}: it has more cells than the first line. Quote a text with the"
+                " separator in it."
+            )
         row = {f: c.strip() for f, c in zip(fields, cells, strict=False) if f and c.strip()}
         if row:
             try:
                 yield _converted(row)
             except ValueError as error:
-                raise ProfileError(f"{file}:{reader.line_num}: {error}") from None
+                raise ProfileError(f"{file}:{line}: {error}") from None
 
 
 def _converted(row: dict[str, str]) -> dict[str, Any]:
@@ -163,8 +183,11 @@ def _counts(code: str, field: str, row: Mapping[str, str], found: Mapping[str, A
     try:
         number = Decimal(row[field].replace(",", "."))
         counts = (number - Decimal(found.get("offset", "0"))) / Decimal(found.get("scale", "1"))
+        usable = counts.is_finite() and counts.adjusted() < MOST_DIGITS
     except (InvalidOperation, ZeroDivisionError):
-        raise ValueError(f"{code}: {field} {row[field]!r} is not a number.") from None
+        usable = False
+    if not usable:
+        raise ValueError(f"{code}: {field} {row[field]!r} is not a number.")
     if counts != counts.to_integral_value():
         scale = found.get("scale", "1")
         raise ValueError(f"{code}: {field} {row[field]} is not a whole number of steps of {scale}.")
