@@ -12,7 +12,9 @@ from tests.mixer import COMMAND, HERTZ, MIXER, installed_mixer
 from tui.cli.main import main
 from tui.drive.errors import ValueRefused
 from tui.drive.profile import library
+from tui.drive.settings.edits import Edits
 from tui.drive.settings.in_force import limits_in_force
+from tui.drive.settings.limits import edit_problems
 from tui.drive.shown import number_of, raw_of_text, shown
 from tui.drive.values import NOT_A_NUMBER, from_words, to_words
 from tui.simulator import DriveSpec, SimulatedDrive
@@ -112,6 +114,33 @@ def test_values_are_written_verified_and_backed_up_by_the_command_line() -> None
     saved = CliRunner().invoke(main, ["backup", *line[:1], "-", *line[1:]])
     assert saved.exit_code == 0, saved.output
     assert "FLOW" in saved.output
+
+
+MODELS = (
+    ROW.format("MODEL", 320, 320)
+    + 'access = "r"\n'
+    + ROW.format("LIMIT", 321, 321)
+    + (
+        'access = "rw"\nunit = "A"\nscale = "0.1"\nmin = 0\nmax = 200\n'
+        'max_of = { parameter = "MODEL", raws = { 1 = 42, 2 = 75 } }\n'
+    )
+)
+
+
+@pytest.mark.parametrize(("model", "most"), [(1, "4.2"), (2, "7.5"), (3, "20.0")])
+def test_model_of_a_family_has_its_own_limit(model: int, most: str) -> None:
+    profile = installed_mixer(more=MODELS)
+    raws = {"MODEL": model, "LIMIT": 10}
+    limits = limits_in_force(profile, profile["LIMIT"], raws)
+    assert limits is not None
+    assert limits.high == Decimal(most)
+    above = Edits().stage(profile, "LIMIT", "8", raws)
+    problems = edit_problems(profile, above, raws)
+    assert ("above" in problems.get("LIMIT", "")) is (model < 3)
+    drive = SimulatedDrive(profile, DriveSpec(MIXER, 1, sets={"MODEL": model}))
+    drive.line_side.answer(1, struct.pack(">BHH", 6, 321, 80))
+    held = drive.line_side.answer(1, struct.pack(">BHH", 3, 321, 1))
+    assert (held != struct.pack(">BBH", 3, 2, 80)) is (model < 3)
 
 
 WIDE_STATUS = (

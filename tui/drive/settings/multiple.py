@@ -18,10 +18,15 @@ def counts_of(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> int | None:
-    """Return the multiple as a raw value, truncated to a whole count; None if not known."""
+    """Return the multiple as a raw value, truncated to a whole count; None if not known.
+
+    With a table instead of a multiple, it is the value of the present entry.
+    """
     raw, scale = raws.get(of.parameter), profile.scale(parameter, raws, absent)
     if raw is None or scale is None:
         return None
+    if of.raws:
+        return of.raws.get(str(raw))
     number = number_of(profile, profile[of.parameter], raw, raws, absent)
     # a rated current of 0 is not a valid rating
     if number is None or (number == 0 and Decimal(of.plus) == 0):
@@ -45,6 +50,8 @@ def value_of(
 
 def formula_of(of: Multiple) -> str:
     """Return the formula: `1.5 x INV`, `100 - tA1`."""
+    if of.raws:
+        return f"the limit by {of.parameter}"
     times, plus = Decimal(of.times), Decimal(of.plus)
     product = of.parameter if abs(times) == 1 else f"{abs(times):f} x {of.parameter}"
     if times < 0:

@@ -148,6 +148,9 @@ def _faults_of(
         yield from _number_keys("scale_by", parameter.scale_by.scales)
         if not parameter.scale_by.scales:
             yield "scale_by", "scale_by has no scales."
+    for key in ("min_of", "max_of", "factory_of"):
+        if (of := getattr(parameter, key)) is not None:
+            yield from _number_keys(key, of.raws)
     if parameter.unit_by:
         yield from _number_keys("unit_by", parameter.unit_by.units)
     for number, times in Counter(bit.bit for bit in parameter.bits).items():
@@ -230,7 +233,7 @@ def _offset_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
         yield "scale", "a reference has neither an offset nor a negative scale."
 
 
-def _number_keys(key: str, names: dict[str, object] | dict[str, str]) -> Iterator[tuple[str, str]]:
+def _number_keys(key: str, names: Iterable[str]) -> Iterator[tuple[str, str]]:
     for raw in names:
         if not raw.lstrip("-").isdecimal() or not raw.isascii():
             yield key, f"{key}: {raw!r} is not a raw value in decimal, such as 0 or 12."

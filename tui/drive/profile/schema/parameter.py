@@ -85,7 +85,10 @@ class Multiple(Table, frozen=True, kw_only=True):
     """
 
     parameter: str
-    times: SignedDecimalText
+    times: SignedDecimalText = "1"
+    raws: dict[str, int] = {}
+    """Instead of a multiple: this one's raw value by that of the other, such as the model's code.
+    A value that is not listed sets no limit."""
     plus: SignedDecimalText = "0"
     """Added to the product, in the same unit: `100 - tA1` is times -1, plus 100."""
 
