@@ -33,7 +33,7 @@ ACCESS: Mapping[str, str] = {
     "": "r", "r": "r", "ro": "r", "r/o": "r", "read": "r",
     "rw": "rw", "r/w": "rw", "rw-stopped": "rw-stopped", "w": "w", "wo": "w",
 }  # fmt: skip
-MOST_DIGITS = 12
+MOST_RAW_DIGITS = 12
 """Most digits of a raw value, so that an absurd exponent takes no time."""
 IN_UNIT = ("min", "max", "factory")
 _NAMED = re.compile(r"\s*(-?\d+)\s*[=:]\s*(.+?)\s*")
@@ -183,7 +183,7 @@ def _counts(code: str, field: str, row: Mapping[str, str], found: Mapping[str, A
     try:
         number = Decimal(row[field].replace(",", "."))
         counts = (number - Decimal(found.get("offset", "0"))) / Decimal(found.get("scale", "1"))
-        usable = counts.is_finite() and counts.adjusted() < MOST_DIGITS
+        usable = counts.is_finite() and counts.adjusted() < MOST_RAW_DIGITS
     except (InvalidOperation, ZeroDivisionError):
         usable = False
     if not usable:
