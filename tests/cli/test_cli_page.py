@@ -79,8 +79,9 @@ def test_commands_of_a_section_run_as_printed(
             assert "needs a terminal" in ended(2, *words).stderr
         else:
             shutil.copy(DOCS / "acceptance" / "atv312.toml", tmp_path)
-        if "plan" in commands_of(text):
             shutil.copy(DOCS / "plan" / "hall-2.toml", tmp_path)
+            (tmp_path / "profiles").mkdir(exist_ok=True)
+            shutil.copy(DOCS.parent / "profiles" / "atv312.toml", tmp_path / "profiles")
             with monkeypatch.context() as there:
                 there.chdir(tmp_path)  # separate programs run in the checkout
                 assert ended(status, *words).exit_code == status, line
