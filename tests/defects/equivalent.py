@@ -45,5 +45,14 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/rtu/exchange.py:noted: constant: 3 -> 4": (
         "It saves time only: a whole reply that is alone has the same remark as one piece of many."
     ),
+    "tui/bus/tally.py:MinuteWindow.__init__: constant: 0 -> 1": (
+        "It is the time of a sum of no buckets, which no buckets are compared with."
+    ),
+    "tui/bus/schedule/step_proof.py:StepProof.not_before: constant: 0 -> 1": (
+        "Before the first request for a proof, both are fewer than the most."
+    ),
+    "tui/bus/shared_state.py:SharedState.give_stop: constant: 0.0 -> 1.0": (
+        "The count of the stop, just before, has given each device its time."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""
