@@ -29,12 +29,15 @@ def stop_among_commands(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def starts_by_mistake(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield stops and resets whose words run the motor, and run commands that all drives take."""
+    by_sign = any(way.reverse == "negative" for way in data.references)
     for index, chart in enumerate(data.charts):
         runs = [order for order in chart.orders if order.id in RUN_ORDERS and order.words]
         for place, order in enumerate(chart.orders):
             at: TomlPath = ("charts", index, "orders", place)
             if order.id in RUN_ORDERS:
-                yield from ((at, fault) for fault in _run_faults(chart, order, runs))
+                # the sign of the reference may give the direction instead of the words
+                before = [] if by_sign else runs
+                yield from ((at, fault) for fault in _run_faults(chart, order, before))
             for run in runs if order.id in ALL_STOPS or order.id == "reset" else ():
                 if any(_same(chart, order, word, run) for word in order.words):
                     yield (

@@ -18,7 +18,7 @@ QUANTITY_UNITS: dict[str, tuple[str, ...]] = {
     "output_frequency": SPEED_UNITS,
     "frequency_reference": SPEED_UNITS,
     "ramp_output": SPEED_UNITS,
-    "command_frequency": SPEED_UNITS,
+    "command_frequency": (*SPEED_UNITS, "V"),
     "command_speed": SPEED_UNITS,
     "speed": SPEED_UNITS,
     "speed_reference": SPEED_UNITS,
