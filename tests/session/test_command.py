@@ -149,6 +149,25 @@ async def test_run_reverse_and_stop(family: str) -> None:
         await made.until(lambda: made.stopped)
 
 
+@pytest.mark.parametrize("family", ["atv320", "ms300", "v20"])
+async def test_confirmed_public_profile_runs_reverses_and_stops(family: str) -> None:
+    """The command word and the reference of the MS300 can only be written."""
+    async with bench(family, armed=False) as made:
+        await made.until(lambda: state_known(made.console.monitor))
+        made.session.confirm_profile()
+        await made.arm()
+        made.commander.refer("20Hz")
+        assert "20" in await made.done()
+        await made.order("forward")
+        await made.until(lambda: 19 < made.drive.motor.frequency < 21)
+        await made.order("reverse")
+        await made.until(lambda: made.drive.motor.frequency < -3)
+        made.stopper.stop([made.session])
+        await made.until(lambda: made.drive.motor.frequency == 0)
+        await made.until(lambda: made.stopped)
+        assert not made.console.latest or not made.console.latest.error
+
+
 STARTS = {
     # as the manuals and facts write the sequences: reference, then the chart step by step
     "atv31": [(8502, 0), (8501, 0x0006), (8501, 0x0007), (8501, 0x000F)],

@@ -541,3 +541,12 @@ async def test_heartbeat_follows_the_commanding_client(start: Start, journal: Jo
     assert seen is not None
     assert seen > started
     await gateway.close()
+
+
+async def test_unproved_profile_passes_reads_and_stops_only(bench: Make) -> None:
+    made = bench(DriveSpec("ms300", 1), profiles={1: "ms300"}, commands=True)
+    assert await made.read(0x2103) == (0,)
+    assert await made.write(0x2000, 0x12) == 1
+    assert await made.write(0x2001, 3000) == 1
+    assert await made.write(0x2000, 0x01) == 0
+    assert made.written() == [(0x2000, 0x01)]

@@ -38,6 +38,13 @@ from .work import WorkQueue
 OWN_PROFILE = "Drive Panel does not write with the profile of another drive."
 
 
+UNPROVED = (
+    "the profile of {name} is written from public documents, and no drive has confirmed it. A wrong"
+    " word may start the motor."
+)
+"""Why a drive of an unproved profile is not armed, until a person confirms."""
+
+
 class DriveSession:
     """A drive with its profile; the only owner of its registers, its work and its arming.
 
@@ -72,6 +79,11 @@ class DriveSession:
         """Contradiction between the drive's reported identity and its profile; empty if none."""
         if self.contradiction:
             self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
+        self.is_unconfirmed = profile.data.profile.unproved
+        """True if nothing but a stop is written, because its profile is unproved, and no person
+        has confirmed it."""
+        if self.is_unconfirmed and not self.contradiction:
+            self.bar_unconfirmed()
         self.byte_order = ByteOrder(device)
         """Evidence that the bytes of its words arrive swapped."""
         self.arming.trouble = lambda: self.byte_order.text
@@ -102,6 +114,16 @@ class DriveSession:
         line.describe(device, limits_of(profile))
         self.note_profile()
         self._hear_others()
+
+    def bar_unconfirmed(self) -> None:
+        """Allow arming, unless the profile is unproved and not confirmed."""
+        text = f"Not armed: {UNPROVED.format(name=self.profile.name)}"
+        self.arming.barred = text if self.is_unconfirmed else ""
+
+    def confirm_profile(self) -> None:
+        """Allow arming although the profile is unproved: a person has confirmed it."""
+        self.is_unconfirmed = False
+        self.bar_unconfirmed()
 
     def note_profile(self) -> None:
         """Have the recorder of the line know by which profile this program reads the drive."""

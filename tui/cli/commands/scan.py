@@ -170,7 +170,9 @@ def _hint(scan: Scan) -> str:
     """Return what to check if no drive answers."""
     if scan.remarks:
         return "drivepanel why LINE -d ADDRESS names the cause and the next steps."
+    from tui.drive.profile import library
+
     look = "Are the drives on, and are the two wires those of the line?"
     if scan.setting is not None and len(scan.settings) == 1:
-        return f"{look} --all-settings tries other baud rates and formats."
-    return look
+        look = f"{look} --all-settings tries other baud rates and formats."
+    return "\n".join((look, *library.factory_notes()))

@@ -139,6 +139,7 @@ class ProfileShown(Document, kw_only=True):
     reading: dict[str, Any]
     blocks: list[Any]
     exceptions: list[Any]
+    frames: list[Any]
     charts: list[Any]
     command_examples: list[Any]
     references: list[Any]

@@ -97,7 +97,7 @@ def _profiles(incomplete: str) -> Items:
 
     return [
         CompletionItem(listing.id, help=listing.name)
-        for listing in library.listings()
+        for listing in (*library.listings(), *library.public_listings())
         if listing.id.startswith(incomplete.lower())
     ]
 

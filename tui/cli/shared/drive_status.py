@@ -309,6 +309,8 @@ def _time_out_text(status: Status) -> str:
         return f"not known: {rules.timeout} was not read"
     if not status.timeout.known:
         return "cannot be read: the drive may react when polling stops"
+    if rules is None and status.session.profile.data.profile.unproved:
+        return "not known: the drive may react when polling stops"
     return watch_text(status.watch)
 
 

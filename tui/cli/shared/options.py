@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import sys
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -14,7 +15,7 @@ from .completion import complete_profile
 from .line_argument import LineArgument, mind_the_drive, mind_the_line, takes_line_as
 from .looking_after import guard_motors, say_shared, to_its_end
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
-from .say import say
+from .say import say, say_prompt
 from .signals import never_suspended
 from .silence import about_silence, wait_for_state
 
@@ -283,12 +284,34 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     session = DriveSession(opened.line, target.device, profile, reported)
     if session.contradiction:
         _believe_the_person(session, target)
+    await _confirm_unproved(session)
     mind_the_drive(opened, target.device, reported, "" if session.contradiction else profile.id)
     await _check_byte_order(session)
     await look_after(opened, session, target.line_text).learn()
     await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session
+
+
+async def _confirm_unproved(session: DriveSession) -> None:
+    """Ask a person at the terminal before a command with --arm uses an unproved profile.
+
+    Without one, arming is refused with the way out.
+    """
+    context = click.get_current_context(silent=True)
+    if not session.is_unconfirmed or context is None or not context.params.get("arm"):
+        return
+    if sys.stdin.isatty() and sys.stderr.isatty():
+        say_prompt(f"{session.arming.barred} Write to device {session.device}? [y/N]")
+        answer = await asyncio.to_thread(sys.stdin.readline)
+        if answer.strip().casefold() in ("y", "yes"):
+            session.confirm_profile()
+            return
+    session.arming.barred = (
+        f"Not armed: no drive has confirmed the profile {session.profile.id}, and no person at a"
+        " terminal. For a script, make a profile of your own and prove it:"
+        f" drivepanel profiles new NAME --from {session.profile.id}"
+    )
 
 
 async def _check_byte_order(session: DriveSession) -> None:
@@ -315,7 +338,7 @@ def _believe_the_person(session: DriveSession, target: Target) -> None:
             else "Name the profile of that drive."
         )
         raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
-    session.arming.barred = ""
+    session.bar_unconfirmed()
     say(
         f"drivepanel: {session.contradiction} {FORCE_PROFILE} uses this profile anyway:"
         " values, units and names may be wrong.",

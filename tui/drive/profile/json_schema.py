@@ -277,6 +277,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "reading": "Reads that the drive answers.",
         "blocks": "Indirect blocks and communication scanners.",
         "exceptions": "Meaning of exception codes.",
+        "frames": "Example frames that the drive answers.",
         "charts": "State charts and their commands.",
         "command_examples": "Complete command words and their effects.",
         "references": "Ways to give the drive its frequency or speed.",

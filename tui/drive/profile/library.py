@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -71,12 +72,41 @@ def submitted_folder() -> Path:
     return packaged_folder() / "evidence"
 
 
+PUBLIC = "public"
+"""Folder of the public profiles in that of the packaged ones."""
+
+
 def profile_files() -> Iterator[tuple[Path, bool]]:
     """Return every profile file, with True for the user's own; the user's come first."""
     for folder, own in ((user_folder(), True), (packaged_folder(), False)):
         if folder.is_dir():
             for path in sorted(folder.glob("*.toml")):
                 yield path, own
+
+
+def public_listings() -> list[Listing]:
+    """Return the profiles written from public documents that no drive has confirmed, by id.
+
+    They are not among the `listings`: only `load` and an identity find them, so that no word of
+    theirs is sent to a drive of another family. A profile of the user with the same id hides them.
+    """
+    folder = packaged_folder() / PUBLIC
+    taken = {listing.id for listing in listings()}
+    found = (_listing(path, False, folder) for path in folder.glob("*.toml"))
+    return sorted(listing for listing in found if listing.id not in taken)
+
+
+def factory_notes() -> list[str]:
+    """Return a sentence for each public profile whose new drives do not answer, and the remedy.
+
+    A file that cannot be used has none.
+    """
+    found = []
+    for listing in public_listings():
+        with suppress(ProfileError):
+            if note := load(listing.id).data.link.at_factory:
+                found.append(note)
+    return found
 
 
 def listings() -> list[Listing]:
@@ -99,8 +129,8 @@ def all_files() -> list[Listing]:
     return sorted(found, key=lambda listing: listing.id)
 
 
-def _listing(path: Path, own: bool) -> Listing:
-    head = file_head(path, own, packaged_folder())
+def _listing(path: Path, own: bool, folder: Path | None = None) -> Listing:
+    head = file_head(path, own, folder or packaged_folder())
     return Listing(
         id=head.text("id") or path.stem,
         name=head.text("name") or path.stem,
@@ -120,10 +150,10 @@ def load(profile_id: str) -> Profile:
 
     Raises UnknownProfile, or ProfileError with the file, the place and the fault.
     """
-    for listing in listings():
+    for listing in (*listings(), *public_listings()):
         if listing.id == profile_id.strip().lower():
             return _with_evidence(load_file(listing.path))
-    known = ", ".join(item.id for item in listings())
+    known = ", ".join(item.id for item in (*listings(), *public_listings()))
     raise UnknownProfile(f"There is no profile {profile_id!r}. Profiles: {known}.")
 
 
@@ -203,8 +233,9 @@ def matching_profiles(reference: str) -> list[str]:
     """Return the ids of profiles whose reference prefixes fit a reported reference, best first."""
     wanted = reference.strip().upper()
     fits: list[tuple[int, str]] = []
-    for listing in listings():
-        prefixes = request_prefixes(listing.path, listing.own, packaged_folder()).prefixes
+    for listing in (*listings(), *public_listings()):
+        folder = packaged_folder() if listing.own else listing.path.parent
+        prefixes = request_prefixes(listing.path, listing.own, folder).prefixes
         longest = max((len(p) for p in prefixes if wanted.startswith(p.upper())), default=0)
         if longest:
             fits.append((longest, listing.id))

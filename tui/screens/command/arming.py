@@ -115,6 +115,9 @@ class ArmingKeys(PanelScreen):
         if (other := self.session.line.facts.commander(self.session.device)) is not None:
             self._ask_for(other)
             return
+        if self.session.is_unconfirmed and not self.session.contradiction:
+            self._confirm_profile()
+            return
         stamp, stroke = self.session.work.stops, self.app.stroke
         if stroke is not None and stroke.stamp != self.app.stop_stamp():
             return  # a stop came while the key went through the screen
@@ -126,6 +129,23 @@ class ArmingKeys(PanelScreen):
         if self._armed() and newest is not None and newest.text == NOT_ARMED:
             self.app.tell(ARMED_AFTER_ALL)
         self.look()
+
+    def _confirm_profile(self) -> None:
+        """Ask, then allow arming by an unproved profile; the drive stays disarmed."""
+        profile = self.session.profile
+
+        def confirm(_stamp: int) -> None:
+            self.session.confirm_profile()
+            self.app.tell(f"Confirmed until this program ends. {NOT_ARMED}")
+
+        self._ask(
+            f"Write to drive {self.session.device} by the unproved profile {profile.id}?",
+            "It is written from public documents, and no drive has confirmed it. A wrong word may"
+            " start the motor. Try it first without a motor.",
+            "Confirm",
+            "Cancel",
+            confirm,
+        )
 
     def _ask_for(self, other: Program) -> None:
         """Ask, then request the drive from the program that commands it."""

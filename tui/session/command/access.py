@@ -56,6 +56,8 @@ class CommandAccess(Writer):
         reader = Reader(self.session)
         if self.session.byte_order.is_suspect:
             await check_byte_order(reader, Priority.OPERATOR_READ)
+        profile = self.session.profile
+        codes = [code for code in codes if profile[code].access != "w"]
         return await reader.read(codes, priority=Priority.OPERATOR_READ)
 
     async def chart(self, wanted: OrderId | None = None) -> Chart:
@@ -137,9 +139,14 @@ class CommandHistory:
         self.wanted = None
 
     def note_command(self, code: str, word: int) -> None:
-        """Remember a command word that was written, and poll it from now on."""
-        self._written, self._written_under = {code: word}, self._session.work.stops
-        self._session.followed = (code,)
+        """Remember a command word that was written, and poll it from now on.
+
+        A word that can only be written is neither polled nor compared.
+        """
+        readable = self._session.profile[code].access != "w"
+        self._written = {code: word} if readable else {}
+        self._written_under = self._session.work.stops
+        self._session.followed = (code,) if readable else ()
 
     def note_option(self, code: str, word: int) -> None:
         """Remember a command word whose option bits were written."""

@@ -91,10 +91,13 @@ def step_in(unit: str) -> int:
 
 
 def reference_codes(profile: Profile) -> list[str]:
-    """Return the codes of the references and of all words that their conversion and limits use."""
+    """Return the codes of the references and of all words that their conversion and limits use.
+
+    A reference that can only be written is not among them.
+    """
     wanted: tuple[Quantity, ...] = (*LIMITS, *MOTOR_DATA, *REFERENCES)
     found = (profile.quantity(quantity) for quantity in wanted)
-    codes = [parameter.code for parameter in found if parameter is not None]
+    codes = [p.code for p in found if p is not None and p.access != "w"]
     codes += scale_codes(profile)
     for parameter in reference_parameters(profile):
         codes += [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]

@@ -71,6 +71,8 @@ def settings_hints(sight: DiagnosticEvidence) -> Iterator[str]:
     if profile is None:
         return
     known = profile.data.link
+    if known.at_factory:
+        yield known.at_factory
     codes = ", ".join(filter(None, (_code(profile, role) for role in SPEED_ROLES)))
     leaves = f"{profile.name} leaves the factory with {known.baud} {known.format} ({codes})."
     if not isinstance(link, SerialLink):

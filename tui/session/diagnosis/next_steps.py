@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from tui.bus.errors import PortMissing
 from tui.bus.link import SerialLink
+from tui.drive.profile import library
 from tui.drive.sentences import any_of
 
 from .evidence import DiagnosticEvidence
@@ -119,6 +120,7 @@ def end_silence(sight: DiagnosticEvidence) -> Iterator[str]:
         yield "Are baud and format those of the drive? Some take new ones at power-up only."
         yield "Are the two wires changed over, the common missing, the ends not terminated?"
         yield NAME_A_FAMILY
+        yield from library.factory_notes()
         yield from search(sight)
         return
     hints = [address_hint(sight), *settings_hints(sight)]

@@ -123,6 +123,8 @@ class GatewayWrite:
         drive = await self._line.drives.found(self._session.device)
         if drive is None or drive.profile.id != self._session.profile.id:
             self._refuse(BUSY, "another drive answers at this address")
+        if self._session.is_unconfirmed:
+            self._refuse(ILLEGAL_FUNCTION, self._session.arming.barred)
         if any(word.kind is WordKind.UNKNOWN for word in words):
             lacking = [word.address for word in words if word.kind is WordKind.UNKNOWN]
             self._refuse(ILLEGAL_FUNCTION, f"no parameter can be written at {lacking}")

@@ -26,7 +26,7 @@ def drive_steps(profile: Profile) -> Iterator[ProofStep]:
 
 def _timeouts(profile: Profile) -> Iterator[ProofStep]:
     watch = profile.data.communication_fault
-    if watch is None:
+    if watch is None or not profile.data.charts:
         return
     at: TomlPath = ("communication_fault",)
     if not watch.reactions:
@@ -58,8 +58,6 @@ def _lose(profile: Profile, place: int | None) -> None:
     bench.wait(float(raw * scale) + 0.5, silent=True)
     if reaction is not None and not reaction.trips:
         _need_no_trip(bench, runs=runs, keeps=reaction.motor_keeps_running or not runs)
-        return
-    if not profile.data.charts:
         return
     if not bench.until(lambda: bench.state().kind == "fault", STOP_SECONDS, silent=True):
         raise Unproved(f"the drive shows {bench.state().state.name}, not a fault")

@@ -3,21 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Parameter
+from tui.drive.profile.profile_frame import READING, frame_contents
+from tui.drive.profile.schema import Parameter, ProfileFrame
 from tui.drive.profile.toml_lines import TomlPath
-from tui.drive.values import is_enumeration, raw_range, type_range, word_count
+from tui.drive.values import (
+    decode,
+    from_words,
+    is_enumeration,
+    raw_range,
+    type_range,
+    word_count,
+)
 
+from .bench_motion import present_scale
 from .command_steps import command_steps
 from .drive_steps import drive_steps
 from .proof_bench import ProofBench, Unproved
-from .proof_step import ProofStep
+from .proof_step import ProofStep, proof_step
 
 
 def prove_profile(profile: Profile) -> Iterator[ProofStep]:
     """Test a checked profile on the drive that is simulated from it, step by step."""
     yield from _reads(profile)
+    yield from _frames(profile)
     yield from command_steps(profile)
     yield from _limits(profile)
     yield from drive_steps(profile)
@@ -77,3 +88,42 @@ def _takes(bench: ProofBench, parameter: Parameter, raw: int) -> bool:
     except Unproved:
         return False
     return bench.read(parameter) == raw
+
+
+# Example frames
+
+
+def _frames(profile: Profile) -> Iterator[ProofStep]:
+    for index, frame in enumerate(profile.data.frames):
+        title = f"frame {frame.sent[:17]} means {', '.join(frame.means)}"
+        yield proof_step(("frames", index), title, partial(_frame, profile, frame))
+
+
+def _frame(profile: Profile, frame: ProfileFrame) -> None:
+    """Replay a frame on a drive with the values that it contains, and compare its meaning."""
+    contents = frame_contents(frame)
+    bench = ProofBench(profile, None)
+    raws = {}
+    for parameter in profile.parameters:
+        at = parameter.address - contents.address
+        same = parameter.function == contents.function or contents.function not in READING
+        if same and 0 <= at <= len(contents.words) - word_count(parameter):
+            raws[parameter.code] = from_words(parameter, contents.words[at:])
+    if contents.function in READING:
+        for code, raw in raws.items():
+            bench.drive.set(code, raw)
+    if bench.ask(contents.request) != contents.reply:
+        raise Unproved("the drive gives another reply")
+    for code, raw in raws.items():
+        if contents.function not in READING and bench.drive.raw(code) != raw:
+            raise Unproved(f"{code} is {bench.drive.raw(code)} after it, not {raw}")
+    shown = {text for code, raw in raws.items() for text in _texts(bench, profile[code], raw)}
+    if wrong := [text for text in frame.means if text not in shown]:
+        raise Unproved(f"it does not mean {wrong[0]}, but {', '.join(sorted(shown)) or 'nothing'}")
+
+
+def _texts(bench: ProofBench, parameter: Parameter, raw: int) -> tuple[str, str]:
+    """Return a value as it is shown, and as a word."""
+    scale = present_scale(bench, parameter)
+    value = decode(parameter, raw, bench.profile.names(parameter), scale)
+    return f"{parameter.code} = {value.display}", f"{parameter.code} = 16#{raw & 0xFFFF:04X}"

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 from tui.drive.values import raw_range
 
+from ..profile_frame import FrameError, frame_contents
 from ..schema import Parameter, ProfileData
 from ..toml_lines import TomlPath
 
@@ -274,7 +275,20 @@ def monitored_bars(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             )
 
 
+def profile_frames(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield example frames without a valid exchange or without a meaning."""
+    for index, frame in enumerate(data.frames):
+        at: TomlPath = ("frames", index)
+        try:
+            frame_contents(frame)
+        except FrameError as error:
+            yield at, f"frame: {error}"
+        if not frame.means:
+            yield at, "frame: `means` is empty. Name each value, such as 2103H = 50.00 Hz."
+
+
 MEANING_RULES = (
+    profile_frames,
     fitting_units,
     references_usable,
     time_of_timeouts,

@@ -71,6 +71,7 @@ from .link import (
     PastLimit,
     Pin,
     PortCounters,
+    ProfileFrame,
     ReadShapes,
 )
 from .monitoring import (
@@ -212,6 +213,7 @@ __all__ = [
     "Predecessor",
     "ProfileData",
     "ProfileEvidence",
+    "ProfileFrame",
     "ProfileHead",
     "Quantity",
     "RawWord",

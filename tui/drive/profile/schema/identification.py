@@ -41,6 +41,9 @@ class ProfileHead(Table, frozen=True, kw_only=True):
     rows_from: list[str] = []
     """Files of rows shared by several families, in the folder of this file; a row here with the
     same key contains the differences."""
+    unproved: bool = False
+    """True if it is written from public documents, and no drive has confirmed it: read at once,
+    written only after a person confirms."""
     without: list[str] = []
     """Codes of shared parameters that this family does not have."""
 

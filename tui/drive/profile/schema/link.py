@@ -52,8 +52,23 @@ class LinkSettings(Table, frozen=True, kw_only=True):
     turnaround_ms: DecimalText = "5"
     """Turnaround a simulated drive shows, in ms."""
     settings: list[LinkSetting] = []
+    at_factory: str = ""
+    """Why a new drive does not answer, and what to set on its keypad; sentences."""
     note: str = ""
     source: str = ""
+
+
+class ProfileFrame(Table, frozen=True, kw_only=True):
+    """A request and its reply as bytes, with checksums, and the values that they contain."""
+
+    sent: str
+    """Bytes in hexadecimal, such as `01 03 21 02 00 02 6F F7`."""
+    answered: str
+    """Bytes of the reply in hexadecimal."""
+    means: list[str]
+    """Values that were read or written, as they are shown: `2103H = 50.00 Hz`."""
+    source: str
+    """The id of a source and the place in it."""
 
 
 class FurtherServer(Table, frozen=True, kw_only=True):

@@ -18,6 +18,7 @@ from .link import (
     LineRule,
     LinkSettings,
     PortCounters,
+    ProfileFrame,
     ReadShapes,
 )
 from .monitoring import CommunicationFault, Faults, Monitoring
@@ -188,6 +189,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     reading: ReadShapes = ReadShapes()
     blocks: list[Block] = []
     exceptions: list[ExceptionCode] = []
+    frames: list[ProfileFrame] = []
     charts: list[Chart] = []
     command_examples: list[CommandExample] = []
     references: list[ReferenceWay] = []
