@@ -138,13 +138,29 @@ def accept(
             say(text)
         return
     need_arming(arm, "accept runs the motor and tests its reactions")
-    _need_person()
-    folder = out or Path(f"{file.stem}-{time.strftime('%Y%m%d-%H%M%S')}")
-    if folder.exists():
-        raise Failure(f"{folder} already exists. Name a new folder with --out.", USAGE)
     if target.profile_id not in (None, test.profile.id):
         text = f"{file} is a test of {test.profile.id}, not of {target.profile_id}."
         raise Failure(text, USAGE)
+    accept_test(test, target, by=by, out=out, read_only=read_only, as_json=as_json)
+
+
+def accept_test(
+    test: AcceptanceFile,
+    target: Target,
+    *,
+    by: str | None = None,
+    out: Path | None = None,
+    read_only: bool = False,
+    as_json: bool = False,
+) -> None:
+    """Carry out a test on a drive with a person at the terminal; --arm was given.
+
+    Raises Failure and Exit with the status.
+    """
+    _need_person()
+    folder = out or Path(f"{test.path.stem}-{time.strftime('%Y%m%d-%H%M%S')}")
+    if folder.exists():
+        raise Failure(f"{folder} already exists. Name a new folder with --out.", USAGE)
     wanted = target._replace(profile_id=test.profile.id)
     session = AcceptSession(test, wanted, folder, by or _login_name(), as_json)
     status = on_line(wanted, session.work, read_only=read_only)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import click
 
 from tui.drive.plain import plain
-from tui.drive.sentences import counted
 
 from ..shared.completion import complete_profile
-from ..shared.errors import DIFFERENT, end_with
+from ..shared.drive_commands import arm_option, need_arming
+from ..shared.errors import DIFFERENT, USAGE, Failure, end_with
 from ..shared.line_argument import named_line_of
 from ..shared.options import SLAVE_ADDRESS, Target, json_option
-from ..shared.registration import ON_LINE, command
+from ..shared.registration import WRITING, command
 from ..shared.rows import GAP, Column, row_text, table_of
 from ..shared.say import say
 from ..shared.sets import refuse_output
@@ -40,7 +40,7 @@ PARAMETER_COLUMNS = (
 @command(
     "List, show, check or confirm drive profiles.",
     group="Profiles",
-    statuses=(DIFFERENT, *ON_LINE),
+    statuses=(DIFFERENT, *WRITING),
 )
 @click.argument(
     "profile_id",
@@ -63,6 +63,9 @@ PARAMETER_COLUMNS = (
     metavar="FILE...",
     help="Test profile files on the drives simulated from them.",
 )
+@click.option("--line", "line_text", metavar="LINE", help="Test it on a drive on this line, too.")
+@arm_option
+@click.option("--without-motor", is_flag=True, help="Run the output; the motor is disconnected.")
 @click.option("--from", "origin", metavar="ID", help="Copy this profile; for new.")
 @click.option(
     "--from-csv",
@@ -98,6 +101,9 @@ def profiles(
     more: tuple[str, ...],
     file: Path | None,
     proved: Path | None,
+    line_text: str | None,
+    arm: bool,
+    without_motor: bool,
     origin: str | None,
     device: int | None,
     to: Path | None,
@@ -119,13 +125,25 @@ def profiles(
     from tui.drive.profile import library
 
     words = (*((profile_id,) if profile_id is not None else ()), *more)
-    if words[:1] != ("confirm",) and (device is not None or to is not None or force):
-        raise click.UsageError("-d, --to and --force are for: profiles confirm ID LINE.")
-    if proved is not None:
+    confirms, proves_on_drive = words[:1] == ("confirm",), line_text is not None
+    _refuse_stray(
+        device=device is not None and not (confirms or proves_on_drive),
+        to=(to is not None or force) and not confirms,
+    )
+    if line_text is not None:
+        from ..running.profile_proof import prove_on_line
+        from .accept import accept_test
+
+        need_arming(arm, "this runs the output of the drive")
+        target = Target(line_text, device or 1, None)
+        prove_on_line(proved, words, target, accept_test, as_json, without_motor=without_motor)
+    elif proved is not None:
         from ..running.profile_proof import prove_files
 
         prove_files([given_file(path) for path in (proved, *map(Path, words))], as_json)
     elif file is not None:
+        from ..running.profile_proof import check_files
+
         check_files([given_file(path) for path in (file, *map(Path, words))], as_json)
     elif schema:
         from tui.drive.profile.json_schema import schema_text
@@ -166,30 +184,10 @@ def _confirm(
     end_with(confirm_profile(target, codes, to, force=force, as_json=as_json))
 
 
-def check_files(files: list[Path], as_json: bool) -> None:
-    """Report every fault of every file; status 2 if there is one."""
-    from tui.drive.profile import library
-
-    from ..documents.other_documents import CheckDocument
-    from ..shared.output import print_json
-
-    found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
-    if as_json:
-        print_json([CheckDocument(file=str(path), faults=some) for path, some in found.items()])
-    else:
-        for path, faults in found.items():
-            if not faults:
-                checked = library.load_file(path)
-                count = len(checked.parameters)
-                say(f"{path}: {checked.name}, {count} parameters, no fault found.")
-    faults = [fault for some in found.values() for fault in some]
-    if faults:
-        from ..shared.errors import USAGE, Failure
-
-        if as_json:
-            raise click.exceptions.Exit(USAGE)
-        head = counted(len(faults), "1 fault found:", "{count} faults found:")
-        raise Failure("\n".join((head, *faults)), USAGE)
+def _refuse_stray(*, device: bool, to: bool) -> None:
+    """Raise UsageError if an option of `confirm` is given for something else."""
+    if device or to:
+        raise click.UsageError("-d, --to and --force are for: profiles confirm ID LINE.")
 
 
 def _tell_folder(as_json: bool) -> None:
@@ -217,7 +215,7 @@ def _begin(words: tuple[str, ...], origin: str | None, table: Path | None, as_js
             "Name the new id and the profile to copy, new NEW-ID --from ID, or a table, new NEW-ID"
             " --from-csv FILE."
         )
-    known = {listing.id: listing for listing in library.listings()}
+    known = {item.id: item for item in (*library.listings(), *library.public_listings())}
     new_id = words[0].strip()
     if new_id in known:
         raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")
@@ -258,8 +256,6 @@ def _from_table(table: Path, new_id: str) -> str:
     from tui.drive.profile.csv_file import profile_from_table
     from tui.drive.small_file import encoding_fault, read_small
 
-    from ..shared.errors import USAGE, Failure
-
     try:
         data = read_small(table).removeprefix(b"\xef\xbb\xbf")
     except OSError as error:
@@ -275,7 +271,7 @@ def _list(as_json: bool) -> None:
     from ..documents.other_documents import ProfileDocument
     from ..shared.output import print_json
 
-    found = library.all_files()
+    found = [*library.all_files(), *library.public_listings()]
     if as_json:
         print_json(
             [
@@ -307,6 +303,8 @@ def _remark(listing: Listing) -> str:
 
     if listing.hidden_by is not None:
         return f"not used, {listing.hidden_by.name} has the same id"
+    if listing.path.parent.name == library.PUBLIC and not listing.own:
+        return f"broken: {listing.fault}" if listing.fault else "public, unproved"
     if not listing.own:
         return f"broken: {listing.fault}" if listing.fault else ""
     faults = [listing.fault] if listing.fault else library.faults_of(listing.path)

@@ -1,7 +1,8 @@
-"""`profiles --prove`: tests profile files on the drives that are simulated from them."""
+"""`profiles --check` and `--prove`: tests of profile files, on simulated drives and on a line."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,7 +11,8 @@ import click
 from tui.drive.sentences import counted
 
 from ..documents.other_documents import ProofDocument, ProofStepField
-from ..shared.errors import DIFFERENT, USAGE, Failure
+from ..shared.errors import DIFFERENT, REFUSED_HERE, USAGE, Failure
+from ..shared.options import Target
 from ..shared.output import print_json
 from ..shared.say import say
 
@@ -22,8 +24,32 @@ ONLY_SIMULATED = (
 )
 
 
-def prove_files(files: list[Path], as_json: bool) -> None:
-    """Test each file, and print each step.
+def check_files(files: list[Path], as_json: bool) -> None:
+    """Report every fault of every file; status 2 if there is one."""
+    from tui.drive.profile import library
+
+    from ..documents.other_documents import CheckDocument
+    from ..shared.output import print_json
+
+    found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
+    if as_json:
+        print_json([CheckDocument(file=str(path), faults=some) for path, some in found.items()])
+    else:
+        for path, faults in found.items():
+            if not faults:
+                checked = library.load_file(path)
+                count = len(checked.parameters)
+                say(f"{path}: {checked.name}, {count} parameters, no fault found.")
+    faults = [fault for some in found.values() for fault in some]
+    if faults:
+        if as_json:
+            raise click.exceptions.Exit(USAGE)
+        head = counted(len(faults), "1 fault found:", "{count} faults found:")
+        raise Failure("\n".join((head, *faults)), USAGE)
+
+
+def prove_files(files: list[Path], as_json: bool, *, quiet: bool = False) -> None:
+    """Test each file, and print each step, unless `quiet`.
 
     Raises Failure with status 2 if a file has a fault that `--check` reports, with 1 if a step
     failed.
@@ -31,7 +57,7 @@ def prove_files(files: list[Path], as_json: bool) -> None:
     documents = [_proved(path) for path in dict.fromkeys(files)]
     if as_json:
         print_json(documents)
-    for document in documents if not as_json else ():
+    for document in documents if not (as_json or quiet) else ():
         for step in document.steps:
             say(_step_line(step))
         if document.passed:
@@ -51,6 +77,34 @@ def prove_files(files: list[Path], as_json: bool) -> None:
         raise Failure("\n".join((head, *faults)), status)
     head = counted(len(failed), "1 step failed:", "{count} steps failed:")
     raise Failure("\n".join((head, *failed)), status)
+
+
+def prove_on_line(
+    path: Path | None,
+    more: tuple[str, ...],
+    target: Target,
+    accept_test: Callable[..., None],
+    as_json: bool,
+    *,
+    without_motor: bool,
+) -> None:
+    """Try a profile that passes on its simulated drive on one without a motor, with a person."""
+    from tui.drive.profile import library
+    from tui.session.acceptance.profile_test import MAY_TRY, MOTOR_FIRST, PROVED_HZ, profile_test
+
+    if path is None or more:
+        raise click.UsageError("--line is for --prove of one file.")
+    prove_files([path], as_json=False, quiet=as_json)
+    profile = library.load_file(path)
+    used = {item.id: item.path for item in (*library.listings(), *library.public_listings())}
+    if profile.id not in used or library.load_file(used[profile.id]).data != profile.data:
+        text = f"{path} is not the profile {profile.id} that Drive Panel uses. Put it into"
+        raise Failure(f"{text} {library.user_folder()}, then try again.", USAGE)
+    if not without_motor:
+        raise Failure(MOTOR_FIRST, REFUSED_HERE)
+    for line in MAY_TRY:
+        say(line.format(hz=PROVED_HZ), err=True)
+    accept_test(profile_test(profile, path), target, as_json=as_json)
 
 
 def _step_line(step: ProofStepField) -> str:

@@ -117,7 +117,8 @@ class AcceptanceRun:
         profile = self.console.session.profile
         codes = [p.code for q in MEASURED if (p := profile.quantity(q)) is not None]
         reference = profile.quantity("command_frequency")
-        codes += [reference.code] if reference is not None else []
+        if reference is not None and reference.access != "w":
+            codes.append(reference.code)
         self.console.monitor.start(period=TEST_PERIOD, extra=codes)
 
     async def _settings(self) -> ParameterSet:

@@ -1,0 +1,64 @@
+"""`profiles --prove FILE --line LINE`: refusals before anything is sent, and its test."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tui.drive.profile import library
+from tui.session.acceptance.plan import planned_motions
+from tui.session.acceptance.profile_test import PROVED_HZ, profile_test
+from tui.session.acceptance.steps import MotionStep, StopStep
+
+from .commands import ended, refused
+
+MS300 = library.packaged_folder() / library.PUBLIC / "ms300.toml"
+WITH_LINE = ("profiles", "--prove", MS300, "--line", "serial:/dev/none")
+
+
+def test_drive_is_not_tried_without_arming() -> None:
+    assert "Not armed: this runs the output" in refused(5, *WITH_LINE, "--without-motor")
+
+
+def test_drive_is_not_tried_with_its_motor() -> None:
+    output = refused(5, *WITH_LINE, "--arm")
+    assert "Disconnect the motor from the drive, then add --without-motor." in output
+
+
+def test_drive_is_not_tried_without_a_person() -> None:
+    output = ended(5, *WITH_LINE, "--arm", "--without-motor").stderr
+    assert "It writes no setting, saves nothing" in output
+    assert "needs a person at the keyboard" in output
+
+
+def test_line_needs_a_file_to_prove() -> None:
+    assert "--line is for --prove of one file." in refused(
+        2, "profiles", "--line", "sim:atv312", "--arm"
+    )
+
+
+def test_file_that_is_not_the_profile_in_use_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "other.toml"
+    path.write_text(MS300.read_text("utf-8").replace('version = "0.1"', 'version = "0.2"'), "utf-8")
+    output = refused(2, "profiles", "--prove", path, "--line", "serial:/dev/none", "--arm")
+    assert "is not the profile ms300 that Drive Panel uses" in output
+
+
+def test_file_that_fails_on_the_simulated_drive_is_not_tried(tmp_path: Path) -> None:
+    path = tmp_path / "other.toml"
+    path.write_text(MS300.read_text("utf-8").replace("2102H = 60.00", "2102H = 6.00"), "utf-8")
+    output = refused(1, "profiles", "--prove", path, "--line", "serial:/dev/none", "--arm")
+    assert "it does not mean 2102H = 6.00 Hz" in output
+
+
+@pytest.mark.parametrize("id", ["atv21", "atv312", "ms300", "powerdrive", "v20"])
+def test_test_of_a_profile_runs_slowly_and_tries_each_stop(id: str) -> None:
+    profile = library.load(id)
+    test = profile_test(profile, Path(f"{id}.toml"))
+    motions = [step for step in test.steps if isinstance(step, MotionStep)]
+    assert all((step.hz or 0) <= PROVED_HZ for step in motions)
+    stops = {step.method for step in motions if isinstance(step, StopStep)}
+    ids = {order.id for chart in profile.data.charts for order in chart.orders}
+    assert stops == ids & {"stop", "quick-stop", "freewheel"}
+    assert len(planned_motions(test)) == len(test.steps)
