@@ -25,7 +25,10 @@ def running_chart(profile: Profile) -> Chart | None:
 
 def spin_motor(bench: ProofBench, id: OrderId, order: Order | None = None) -> None:
     """Run the motor; raises Unproved if it does not turn as commanded and shown."""
-    refer_motor(bench, top_hertz(bench) / 2)
+    way = next(iter(bench.profile.data.references), None)
+    # a sign of the reference may give the direction
+    backward = id == "reverse" and way is not None and way.reverse == "negative"
+    refer_motor(bench, top_hertz(bench) / (-2 if backward else 2))
     bench.send(id, order)
     sign = -1 if id == "reverse" else 1
     if not bench.until(lambda: bench.hz * sign > 1 and _kind(bench) == "running", REACHED_SECONDS):
