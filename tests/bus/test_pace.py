@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any, cast
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -44,3 +46,17 @@ def test_same_read_of_two_programs_is_sent_once() -> None:
     pace.others = {1: 0.8}
     assert pace.claim("a", 1, 0.08, 0.1) == pytest.approx(0.1)
     assert pace.claim("b", 2, 0.08, 0.1) == pytest.approx(0.1 * 1.6 / SHARE)
+
+
+def test_wishes_are_summed_under_the_lock_under_which_they_change() -> None:
+    pace, locked = Pace(), []
+
+    class Wishes(dict[object, tuple[int, float]]):
+        def values(self) -> Any:
+            locked.append(pace._lock.locked())
+            return super().values()
+
+    pace._wishes = cast(Any, Wishes({"a": (1, 0.25), "b": (1, 0.5), "c": (2, 0.125)}))
+    assert pace.own == {1: 0.75, 2: 0.125}
+    assert locked == [True]
+    assert not pace._lock.locked()
