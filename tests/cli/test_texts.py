@@ -56,14 +56,15 @@ ESCAPED = json.dumps(NAME + "\x9b2J\u202e").replace("\x7f", "\\u007f")
 
 @pytest.fixture
 def evil(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """A profile in which every name, unit and note commands the terminal."""
+    """A profile in which every name, note and unit of no motion commands the terminal."""
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
     (tmp_path / "profiles").mkdir()
     whole = (library.packaged_folder() / "atv71.toml").read_text("utf-8")
     text = re.sub(r'^id = "atv71"$', 'id = "evil"', whole, flags=re.M)
     for key in ("name", "unit", "note", "summary", "group", "title", "does", "starts", "cause"):
         text = re.sub(
-            rf'(?<![\w]){key} = "([^"\n]*)"',
+            # references, ramps and timeouts in no known unit are refused
+            rf'(?<![\w]){key} = "(?!(?:k?Hz|s|ms|rpm|%|A|V|kW|Nm)")([^"\n]*)"',
             lambda m, key=key: f'{key} = {ESCAPED[:-1]}{m[1]}"',  # type: ignore[misc]
             text,
         )

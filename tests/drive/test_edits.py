@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from tui.drive.errors import UnknownParameter, ValueRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
-from tui.drive.settings.edits import Edit, Edits, consequences
+from tui.drive.settings.edits import Edit, Edits, command_settings, consequences
 from tui.drive.settings.limits import edit_problems, limit_pairs
 from tui.drive.settings.writable import cuts_line
 from tui.drive.settings.write_sequence import ordered
@@ -274,3 +274,27 @@ def test_ignoring_communication_loss_is_never_written(family: str) -> None:
         Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 1})
     # a value that the drive already has is not an edit
     assert len(Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 0})) == 0
+
+
+def test_change_of_the_command_source_is_reported() -> None:
+    """An input that is on at the new source would start the motor."""
+    staged = Edits().stage(ATV71, "CD1", "1", {"CD1": 10, **HELD})
+    assert consequences(ATV71, staged, HELD) == [
+        "CD1 decides who commands the motor. If a run command is on at the new source, the motor"
+        " starts."
+    ]
+    same = Edits().stage(ATV71, "CD1", "10", {"CD1": 10, **HELD})
+    assert consequences(ATV71, same, HELD) == []
+
+
+@pytest.mark.parametrize(
+    ("family", "codes"),
+    [
+        ("atv71", {"CHCF", "CD1", "CD2", "CCS", "FR1", "FR2", "RFC"}),
+        ("atv312", {"CHCF", "Cd1", "Cd2", "CCS", "Fr1", "LAC", "rFC"}),
+        ("atv21", {"CMOD"}),
+        ("powerdrive", {"6.43"}),
+    ],
+)
+def test_settings_of_the_command_source_are_known(family: str, codes: set[str]) -> None:
+    assert codes <= command_settings(library.load(family))

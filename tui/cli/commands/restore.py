@@ -256,6 +256,7 @@ def _restored(
 
 def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> None:
     """Report the plan: writes in their order, and omitted settings with the reason."""
+    from tui.drive.settings.edits import commander_changes
     from tui.drive.settings.write_sequence import ordered
 
     items = {item.code: item for item in plan.items_of_kind("write")}
@@ -280,6 +281,8 @@ def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> No
         messages.tell(ACROSS_TABLE if plan.mapped_by else ACROSS_QUANTITIES)
     if plan.mapped_by:
         messages.tell(f"Source of the table: {sentence(plan.mapped_by)}")
+    for text in commander_changes(session.profile, plan.edits):
+        messages.tell(text)
     counts = (
         f"{plan.count('write')} to write, {plan.count('equal')} equal already,"
         f" {plan.count('skip')} left out."

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from ..errors import ValueRefused
 from ..profile.profile import Profile
+from ..sentences import all_of
 from ..shown import raw_of_text, shown
 from ..values import check_raw
 from .writable import never_set, warning
@@ -191,13 +192,41 @@ def _encoded(
     )
 
 
+COMMANDED_ELSEWHERE = (
+    "{codes} {decides} who commands the motor. If a run command is on at the new source, the motor"
+    " starts."
+)
+
+
+def command_settings(profile: Profile) -> set[str]:
+    """Return the codes of the settings that decide who commands the motor."""
+    found: set[str] = set()
+    for path in profile.data.signal_paths:
+        if path.carries == "command":
+            others = (switch.other.parameter for switch in path.switches)
+            found.update((path.first.parameter, *others))
+            found.update(condition.parameter for condition in path.when)
+            found.update(switch.parameter for switch in path.switches)
+    return {code for code in found if code and profile[code].access.startswith("rw")}
+
+
+def commander_changes(profile: Profile, edits: Edits) -> list[str]:
+    """Return a warning if edits change who commands the motor, else nothing."""
+    decides = command_settings(profile)
+    codes = [edit.code for edit in edits if edit.code in decides and edit.old != edit.new]
+    if not codes:
+        return []
+    verb = "decides" if len(codes) == 1 else "decide"
+    return [COMMANDED_ELSEWHERE.format(codes=all_of(codes), decides=verb)]
+
+
 def consequences(
     profile: Profile, edits: Edits, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> list[str]:
-    """List the values that change in engineering units without an edit, because their scale
-    changes."""
+    """List what follows from edits besides themselves: another command source, and values that
+    change in engineering units because their scale changes."""
     after = edits.after(raws)
-    reported: list[str] = []
+    reported = commander_changes(profile, edits)
     for parameter in profile.parameters:
         follows = parameter.scale_source
         raw = raws.get(parameter.code)

@@ -37,8 +37,9 @@ STEP_SIGNS: Mapping[str, tuple[str, Style]] = {
     "changed": ("◆", ALARM),
 }
 """Sign of a step by its state; `changed` if a setting changed after it was done."""
-STEPS_WIDTH, RESULT_WIDTH = 24, 18
-"""Columns of the steps; columns of each one's result on a wide screen."""
+STEPS_WIDTH, RESULT_WIDTH, STEP_ROOM = 24, 18, 24
+"""Columns of the steps; more columns for their results on a wide screen, and the most of a name
+there."""
 RESULTS_FROM = 110
 LABEL_WIDTH, VALUE_ROOM, NAME_WIDTH = 19, 14, 19
 """Columns of a usual label, the least beside a longer one, and those of a parameter's name."""
@@ -112,6 +113,10 @@ def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
     start_up = view.start_up
     steps, at = start_up.guide.steps, start_up.index
     top = max(0, min(at - rows // 2, len(steps) - rows))
+    room = STEPS_WIDTH - 7
+    if width > STEPS_WIDTH:
+        # a name is not cut while there is room for it beside the results
+        room = max(room, *(min(len(plain(step.step)), STEP_ROOM) for step in steps))
     lines = []
     for number, step in enumerate(steps[top : top + rows], start=top + 1):
         state = _state(view, step)
@@ -119,10 +124,9 @@ def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
         here = number == at + 1
         text = Text(" ▸" if here else "  ", ATTENTION, no_wrap=True)
         text.append(sign, style)
-        name = cut(plain(step.step), STEPS_WIDTH - 7)
-        text.append(f" {number:>2} {name}", STRONG if here else PLAIN)
+        text.append(f" {number:>2} {cut(plain(step.step), room)}", STRONG if here else PLAIN)
         if width > STEPS_WIDTH:
-            text.append(f" {cut(_result(view, step), RESULT_WIDTH - 1)}", FAINT)
+            text.append(f" {cut(_result(view, step), width - 8 - room)}", FAINT)
         lines.append(text)
     return lines
 
