@@ -58,6 +58,7 @@ WITHOUT_LOCK = {
         "used by its own thread; a deque, changed in one step",
     ),
     "LineRecorder.close": ("_closed", "set once"),
+    "Journal._count": ("_uncounted eeprom", "only its own thread uses them"),
     "ReplayLine._run": ("_loop", "set once, before the line is used"),
     "ReplayLine._work": ("_workers", "only the loop of the line changes it"),
     "ReplayLine.close": ("_closed", "set once"),

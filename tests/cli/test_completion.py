@@ -70,12 +70,12 @@ def test_options_are_completed() -> None:
 def test_lines_are_completed(command: str) -> None:
     assert completed(f"{command}/dev/") == ["/dev/ttyUSB0", "/dev/ttyUSB1"]
     assert completed(f"{command}tc") == ["tcp:"]
-    assert completed(f"{command}sim:atv3") == ["sim:atv31", "sim:atv312"]
+    assert completed(f"{command}sim:atv3") == ["sim:atv31", "sim:atv312", "sim:atv320"]
     assert completed(f"{command}sim:atv71@2,atv31") == ["sim:atv71@2,atv31", "sim:atv71@2,atv312"]
 
 
 def test_profiles_are_completed() -> None:
-    packaged = {listing.id for listing in library.listings()}
+    packaged = {item.id for item in (*library.listings(), *library.public_listings())}
     assert set(completed("read /dev/ttyUSB0 -p ")) == packaged
     assert completed("profiles pow") == ["powerdrive"]
     assert completed("simulate pow") == ["powerdrive"]
@@ -102,7 +102,7 @@ def test_wrong_word_completes_to_nothing() -> None:
     ("typed", "replies"),
     [
         ("drivepanel stat", "status"),
-        ("drivepanel read sim:atv3", "atv31 atv312"),  # bash's word begins behind the colon
+        ("drivepanel read sim:atv3", "atv31 atv312 atv320"),  # bash's word begins behind the colon
         ("drivepanel read sim:atv71@2,pow", "@2,powerdrive"),  # and with the @
         ("drivepanel read sim:atv71@2,atv312 -d 1 AC", "ACC AC2"),
         ("drivepanel write sim:atv312 ACC", "ACC="),

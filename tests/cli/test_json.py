@@ -96,7 +96,8 @@ def test_profiles_are_listed_as_json() -> None:
     assert [set(item) for item in listed] == [
         {*HEAD, "id", "name", "vendor", "parameters", "own", "file", "remark"}
     ] * len(listed)
-    packaged = {path.stem for path in library.packaged_folder().glob("*.toml")}
+    folder = library.packaged_folder()
+    packaged = {path.stem for at in (folder, folder / library.PUBLIC) for path in at.glob("*.toml")}
     assert {item["id"] for item in listed} == packaged
     for item in listed:
         assert item["parameters"] == len(library.load(item["id"]).parameters)

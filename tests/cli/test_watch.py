@@ -194,12 +194,20 @@ def test_full_disk_is_reported() -> None:
 @pytest.mark.parametrize(
     "command",
     [("write", "ACC=5", "--arm"), ("run", "--arm"), ("reference", "5", "--arm"),
-     ("reset", "--arm"), ("backup", "x.toml"), ("report", "x.md"), ("teach",), ("block",)],
+     ("reset", "--arm"), ("teach",), ("block",)],
 )  # fmt: skip
 def test_several_drives_for_a_one_drive_command_exit_with_2(command: tuple[str, ...]) -> None:
     name, *more = command
     output = refused(2, name, "sim:atv71@1,atv71@2", *more, "-d", "1", "-d", "2")
     assert "this command is for one drive" in output
+
+
+@pytest.mark.parametrize(
+    ("command", "option"), [(("backup", "x.toml"), "--recipe"), (("report", "x.md"), "--page")]
+)
+def test_several_drives_need_the_option_for_them(command: tuple[str, ...], option: str) -> None:
+    output = refused(2, command[0], "sim:atv71@1,atv71@2", command[1], "-d", "1", "-d", "2")
+    assert f"several -d require {option}." in output.casefold()
 
 
 def test_panel_with_several_drives_exits_with_2() -> None:

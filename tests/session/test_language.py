@@ -233,7 +233,10 @@ def test_shared_rows_are_merged_into_a_profile(tmp_path: Path) -> None:
 
 def test_own_row_follows_the_row_above_it(tmp_path: Path) -> None:
     between = '[[parameters]]\ncode = "ACC"\n\n' + ROW.replace("HOLD", "OWN")
-    path = shared(tmp_path, between + ROW.replace("HOLD", "NEXT").replace("77", "78"))
+    path = shared(
+        tmp_path,
+        between + ROW.replace("HOLD", "NEXT").replace("77", "78").replace("its", "another"),
+    )
     assert library.faults_of(path) == []
     codes = [p.code for p in library.load_file(path).parameters]
     assert codes == ["ACC", "OWN", "NEXT", "DEC", "HOURS", "ENERGY"]

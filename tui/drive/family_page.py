@@ -203,6 +203,14 @@ def schematic_text(item: LineSchematic) -> str:
     return " ".join((*parts, f"At both ends: {TERMINATORS[item.terminator]}.", item.cable))
 
 
+def end_texts(item: LineSchematic) -> Iterator[str]:
+    """Return the polarization and the termination of a schematic for a person at the line."""
+    if item.master_ohm:
+        span = " to ".join(map(str, dict.fromkeys(item.master_ohm)))
+        yield f"Polarization: {span} ohm to each of 5 V and common, in one place, at the master."
+    yield f"Termination: {TERMINATORS[item.terminator]} at both ends."
+
+
 def _parts(data: ProfileData) -> Iterator[PageRow]:
     for part in data.parts:
         yield PageRow(part.number, part.text, SURENESS[part.confidence])

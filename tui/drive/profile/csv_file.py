@@ -164,7 +164,7 @@ def _converted(row: dict[str, str]) -> dict[str, Any]:
         found["values"] = _names(code, values)
     found["access"] = ACCESS[access]
     found |= {f: row[f] for f in ("storage", "quantity", "note") if f in row}
-    return {**found, "group": row.get("group", "Settings"), "source": "table",
+    return {**found, "group": row.get("group", "Table"), "source": "table",
             "confidence": "unverified"}  # fmt: skip
 
 

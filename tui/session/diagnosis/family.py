@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tui.bus.link import SerialLink
+from tui.drive.family_page import end_texts
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import LinkSetting
 from tui.drive.sentences import all_of, any_of
@@ -97,6 +98,8 @@ def wiring_hints(sight: DiagnosticEvidence, *, answers: bool = False) -> Iterato
     data = sight.profile.data
     if not answers:
         yield from _wire_hints(sight.profile)
+    if data.schematics:  # the first one is the manual's standard
+        yield from end_texts(data.schematics[0])
     for rule in data.line_rules:
         subject = rule.subject.casefold()
         if subject in WIRED or subject.endswith(f", {WIRED[-1]}"):

@@ -7,7 +7,6 @@ person must agree, at the keyboard or by naming the parameter.
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Awaitable, Callable, Collection
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -115,7 +114,7 @@ async def read_counts(session: DriveSession, counts: EepromCounts) -> DriveCount
 
 def wear_of(session: DriveSession, counts: DriveCounts, code: str) -> Wear:
     """Return the wear by writes of a parameter, or by saves for an empty code."""
-    return Wear.of(counts.of(code), session.profile.data.memory.eeprom, time.time())
+    return Wear.of(counts.of(code), session.profile.data.memory.eeprom, session.clock.wall())
 
 
 def wear_summary(session: DriveSession, counts: DriveCounts) -> str:

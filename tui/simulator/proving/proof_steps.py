@@ -9,8 +9,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.profile_frame import READING, frame_contents
 from tui.drive.profile.schema import Parameter, ProfileFrame
 from tui.drive.profile.toml_lines import TomlPath
+from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import (
-    decode,
     from_words,
     is_enumeration,
     raw_range,
@@ -18,7 +18,6 @@ from tui.drive.values import (
     word_count,
 )
 
-from .bench_motion import present_scale
 from .command_steps import command_steps
 from .drive_steps import drive_steps
 from .proof_bench import ProofBench, Unproved
@@ -124,6 +123,6 @@ def _frame(profile: Profile, frame: ProfileFrame) -> None:
 
 def _texts(bench: ProofBench, parameter: Parameter, raw: int) -> tuple[str, str]:
     """Return a value as it is shown, and as a word."""
-    scale = present_scale(bench, parameter)
-    value = decode(parameter, raw, bench.profile.names(parameter), scale)
-    return f"{parameter.code} = {value.display}", f"{parameter.code} = 16#{raw & 0xFFFF:04X}"
+    raws = bench.raws(depends_on(parameter))
+    text = shown_text(bench.profile, parameter, raw, raws)
+    return f"{parameter.code} = {text}", f"{parameter.code} = 16#{raw & 0xFFFF:04X}"
