@@ -10,6 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
 
+import pytest
+
 from .sources import ROOT, modules, nodes_of
 
 TREES = ("tui", "tests", "benchmarks", "screenshots")
@@ -166,6 +168,7 @@ def test_documents_are_found() -> None:
     assert len([name for name in names if name.startswith("docs/decisions/")]) >= 9
 
 
+@pytest.mark.sweep
 def test_documents_name_existing_things_only() -> None:
     """One test for all documents, as the search for names parses the whole source first."""
     found = {}

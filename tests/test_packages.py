@@ -110,6 +110,7 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
+@pytest.mark.sweep
 def test_source_package_contains_the_whole_repository(unpacked: Path) -> None:
     listed = subprocess.run(
         ["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=False

@@ -349,6 +349,7 @@ def test_no_text_is_glued_from_pieces() -> None:
     assert not found
 
 
+@pytest.mark.sweep
 def test_every_exception_of_glue_is_needed() -> None:
     assert {(item.path, item.text) for item in all_glued()} >= GLUED.keys()
 

@@ -50,6 +50,7 @@ def run(folder: Path, *words: str, **variables: str) -> subprocess.CompletedProc
     )  # fmt: skip
 
 
+@pytest.mark.sweep
 def test_added_command_runs_and_prints_its_document(copy: Path) -> None:
     done = run(copy, "-m", "tui", "clock", "--json")
     assert (done.returncode, done.stderr) == (0, "")

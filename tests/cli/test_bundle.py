@@ -41,6 +41,7 @@ def bundled(file: Path, *words: str) -> tuple[dict[str, Any], dict[str, bytes]]:
     return report, files
 
 
+@pytest.mark.sweep
 def test_bundle_of_two_drives_is_complete_and_writes_nothing(tmp_path: Path) -> None:
     file = tmp_path / "a.zip"
     with counted("atv71") as served:
@@ -94,6 +95,7 @@ def test_silent_drive_is_diagnosed_by_its_remembered_profile(tmp_path: Path) -> 
     assert "did not answer" in missing["drive-2/settings.toml"]
 
 
+@pytest.mark.sweep
 def test_unidentified_drive_needs_its_profile(tmp_path: Path) -> None:
     with tcp_line("powerdrive@2") as line:
         report, _ = bundled(tmp_path / "a.zip", line, "-d", "2")

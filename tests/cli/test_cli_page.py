@@ -61,6 +61,7 @@ SHORT = [text for text in EXAMPLES.values() if not LONG & {*commands_of(text)}]
 
 
 @pytest.mark.parametrize("text", kept(EXAMPLES.values(), *SHORT), ids=EXAMPLES.keys())
+@pytest.mark.sweep
 def test_commands_of_a_section_run_as_printed(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

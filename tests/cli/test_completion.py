@@ -108,6 +108,7 @@ def test_wrong_word_completes_to_nothing() -> None:
         ("drivepanel write sim:atv312 ACC", "ACC="),
     ],
 )
+@pytest.mark.sweep
 def test_bash_completes_commands_and_lines(typed: str, replies: str, tmp_path: Path) -> None:
     program = tmp_path / "drivepanel"
     program.write_text(f'#!/bin/bash\nexec {shlex.quote(sys.executable)} -m tui "$@"\n')

@@ -20,6 +20,7 @@ def line() -> Iterator[str]:
         yield served
 
 
+@pytest.mark.sweep
 def test_control_is_taken_and_given_back(line: str) -> None:
     output = motor(5, line, *DRIVE, "--arm", "--for", "1")
     assert "run --take-control takes the control first." in output

@@ -125,6 +125,7 @@ ELSEWHERE = {
 
 
 @pytest.mark.parametrize("name", RUNS)
+@pytest.mark.sweep
 def test_printed_documents_fit_the_schema(name: str, folder: Path) -> None:
     status, words, expected = RUNS[name]
     typed = [word.replace("FOLDER", str(folder)) for word in words]
@@ -144,6 +145,7 @@ def test_every_document_names_a_command_and_every_command_has_one() -> None:
     assert named == set(COMMANDS) - NO_JSON
 
 
+@pytest.mark.sweep
 def test_run_and_stop_print_their_documents() -> None:
     done = drivepanel("run", *DRIVE, "--reference", "20Hz", "--for", "2", "--arm", "--json")
     assert done.returncode == 0, done.stderr
@@ -218,6 +220,7 @@ def test_simulate_prints_its_documents(tmp_path: Path) -> None:
     assert reported["drives"] == [{"profile": "atv71", "device": 2}]
 
 
+@pytest.mark.sweep
 def test_ghost_prints_its_documents(tmp_path: Path) -> None:
     place = f"{record_of_one_reply(tmp_path)}@2"
     simulate = [*DRIVEPANEL, "simulate", "--from", place, "--tcp", "127.0.0.1:0", "--json"]

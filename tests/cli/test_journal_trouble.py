@@ -70,6 +70,7 @@ def test_write_without_a_journal_is_done_and_reported() -> None:
 
 
 @pytest.mark.parametrize("command", kept([WRITE, STOP, STOP_ALL, REFERENCE, RUN], WRITE, RUN))
+@pytest.mark.sweep
 def test_full_disk_is_reported_and_fails_nothing_else(
     command: tuple[str, ...],
 ) -> None:
@@ -120,6 +121,7 @@ def test_lost_output_does_not_report_done_work_as_failed(
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="without /dev/full")
 @pytest.mark.parametrize("more", [(), ("--json",)])
+@pytest.mark.sweep
 def test_lost_requested_output_is_a_failure(more: tuple[str, ...]) -> None:
     with Path("/dev/full").open("w") as full:
         done = program(*READ, *more, out=full.fileno())
@@ -131,6 +133,7 @@ def test_lost_requested_output_is_a_failure(more: tuple[str, ...]) -> None:
 
 
 @pytest.mark.parametrize("which", kept(CLOSED, "2", "all"))
+@pytest.mark.sweep
 def test_closed_streams_do_no_harm(which: str) -> None:
     command = f'exec "$@" {CLOSED[which]}'
     done = subprocess.run(

@@ -75,6 +75,7 @@ def test_named_drive_can_be_compared_and_restored_to(line: str, tmp_path: Path) 
     assert "0 to write" in run(0, "restore", "fan", file, "--dry-run")
 
 
+@pytest.mark.sweep
 def test_environment_selects_the_line(
     line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -104,6 +104,7 @@ def test_profile_options_apply_to_all_drives_or_one() -> None:
     assert taken == {(1, "atv31", "named"), (2, "atv71", "named")}
 
 
+@pytest.mark.sweep
 def test_summaries_are_printed_periodically() -> None:
     found = reported(TWO, "--for", "2.5", "--every", "1")
     assert [row["event"] for row in found].count("summary") == 3

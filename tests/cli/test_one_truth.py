@@ -26,6 +26,7 @@ ELSEWHERE = {
 
 
 @pytest.mark.parametrize(("family", "sets", "why"), ELSEWHERE.values(), ids=ELSEWHERE.keys())
+@pytest.mark.sweep
 def test_status_and_run_use_the_same_words(family: str, sets: dict[str, int], why: str) -> None:
     words = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
     with tcp_line(f"{family}@1", *words) as line:

@@ -131,6 +131,7 @@ def test_warning_repeats_the_family_that_was_typed() -> None:
         assert "timeout 11.63 runs" in output
 
 
+@pytest.mark.sweep
 def test_run_warns_of_a_pending_trip_at_its_end() -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         done = drivepanel("run", line, "--reference", "10Hz", "--for", "0.5", "--arm", "--json")
@@ -143,6 +144,7 @@ def test_run_warns_of_a_pending_trip_at_its_end() -> None:
 
 
 @pytest.mark.parametrize("command", ["reference", "reset"])
+@pytest.mark.sweep
 def test_timeout_is_reported_after_commands_that_write(command: str) -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         more = ["10Hz"] if command == "reference" else []
@@ -158,6 +160,7 @@ def in_fault(line: str) -> bool:
     return bool(held(line, STATUS_21) & 2)
 
 
+@pytest.mark.sweep
 def test_hold_prints_immediately_keeps_polling_and_warns_at_the_end() -> None:
     with tcp_line("atv21@1", "--set", "F803=2") as line:
         hold = (*DRIVEPANEL, "read", line, "FD01", "--hold", "6")
@@ -174,6 +177,7 @@ SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 
 
 @pytest.mark.parametrize("number", kept(SIGNALS, signal.SIGTERM), ids=lambda number: number.name)
+@pytest.mark.sweep
 def test_hold_ends_on_a_signal_with_a_warning(number: signal.Signals) -> None:
     with tcp_line("atv21@1", "atv71@2") as line:
         hold = (*DRIVEPANEL, "hold", line, "-d", "1", "-d", "2")
@@ -249,6 +253,7 @@ def test_hold_without_a_drive_exits_with_3() -> None:
         assert "protects nobody" not in refused(3, "hold", line, "-d", "9")
 
 
+@pytest.mark.sweep
 def test_hold_keeps_a_drive_alive_while_it_scans() -> None:
     """An address without a drive takes seconds."""
     with tcp_line("atv21@1", "--set", "F803=2") as line:

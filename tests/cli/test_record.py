@@ -70,6 +70,7 @@ def test_nothing_is_recorded_without_a_trigger_that_fires(tmp_path: Path) -> Non
     assert rows(path) == []
 
 
+@pytest.mark.sweep
 def test_ctrl_c_ends_the_recording_with_a_whole_file(tmp_path: Path) -> None:
     path = tmp_path / "values.sqlite"
     with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:

@@ -303,6 +303,7 @@ def test_shared_line_is_not_scanned_at_other_settings() -> None:
             assert "Altivar 71" in ended(0, "scan", line, "--addresses", "1-2").stdout
 
 
+@pytest.mark.sweep
 def test_ctrl_c_keeps_the_hits() -> None:
     with line_of(DriveSpec("atv71", 1)) as line:
         scan = [*DRIVEPANEL, "scan", line, "--all-settings", "--json"]
@@ -342,6 +343,7 @@ def seen(near: int, wanted: str) -> None:
             text += os.read(near, 4096).decode()
 
 
+@pytest.mark.sweep
 def test_drives_are_kept_alive_during_the_question() -> None:
     simulation = Simulation([DriveSpec("atv21", 1, sets={"F803": 2})], timing=LineTiming())
     with simulation:

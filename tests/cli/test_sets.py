@@ -83,6 +83,7 @@ def test_drive_is_compared_with_factory_settings(line: str) -> None:
     assert "ACC" in run(1, "compare", "factory", line, "-d", "2", "--all")
 
 
+@pytest.mark.sweep
 def test_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     sets = {f"SP{n}": 100 + n for n in range(2, 9)} | {"ACC": 77, "dEC": 66, "AC2": 55}
@@ -126,6 +127,7 @@ def test_restore_without_a_final_comparison_exits_with_3(
     assert "Not all of it was seen again: The gateway is gone." in output
 
 
+@pytest.mark.sweep
 def test_restore_ended_by_ctrl_c_reports_its_writes_and_exits_with_130(tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     settings = [part for n in range(2, 9) for part in ("--set", f"SP{n}={100 + n}")]
@@ -155,6 +157,7 @@ def _unbuffered() -> dict[str, str]:
     return {**os.environ, "PYTHONUNBUFFERED": "1"}
 
 
+@pytest.mark.sweep
 def test_backups_before_and_after_a_run_differ_in_time_only(tmp_path: Path) -> None:
     with tcp_line("atv71@2", "--set", "DEC=1") as line:
         run(0, "backup", line, tmp_path / "a", "-d", "2")
@@ -434,6 +437,7 @@ def test_steps_left_after_a_write_are_reported(
     assert all(part in text for part, text in zip(parts, messages.texts, strict=True))
 
 
+@pytest.mark.sweep
 def test_dash_is_standard_output_and_standard_input() -> None:
     line = "sim:atv71@2"
     text = run(0, "backup", line, "-", "-d", "2")

@@ -52,6 +52,7 @@ def lose(
     ],
     ids=["no answer", "hangs"],
 )
+@pytest.mark.sweep
 def test_status_shows_known_values_if_a_setting_is_not_read(
     seconds: float, status: int, watch: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

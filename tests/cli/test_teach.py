@@ -153,6 +153,7 @@ def test_reference_is_written_to_the_confirmed_preset(line: str) -> None:
     assert held(line, PRESET) == 700
 
 
+@pytest.mark.sweep
 def test_run_takes_control_uses_the_learned_reference_and_gives_it_back(line: str) -> None:
     output = motor(5, line, *DRIVE, "--arm", "--for", "1")
     assert "run --take-control takes the control first." in output

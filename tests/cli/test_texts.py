@@ -97,6 +97,7 @@ READING = {
 
 
 @pytest.mark.parametrize("name", kept(READING, "status", "read json", "watch"))
+@pytest.mark.sweep
 def test_texts_of_drives_and_profiles_do_not_control_terminal(
     name: str, line: str, evil: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -117,6 +118,7 @@ def test_texts_of_drives_and_profiles_do_not_control_terminal(
             assert tmp_path / argument in written
 
 
+@pytest.mark.sweep
 def test_backup_with_control_characters_is_read_back(line: str, evil: str, tmp_path: Path) -> None:
     path = tmp_path / "set.toml"
     run(0, "backup", line, path, "-p", evil)

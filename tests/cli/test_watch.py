@@ -29,6 +29,7 @@ def cycles(*arguments: str) -> list[dict[str, Any]]:
     return [json.loads(line) for line in reported.splitlines()]
 
 
+@pytest.mark.sweep
 def test_no_value_is_good_after_the_server_exits() -> None:
     with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
         line = f"tcp:127.0.0.1:{port_of(simulation.ready)},timeout=0.2"
@@ -54,6 +55,7 @@ def test_no_value_is_good_after_the_server_exits() -> None:
             watching.process.kill()
 
 
+@pytest.mark.sweep
 def test_drive_lost_at_the_end_exits_with_3() -> None:
     with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
         line = f"tcp:127.0.0.1:{port_of(simulation.ready)},timeout=0.2"

@@ -112,6 +112,7 @@ def test_absent_drive_is_reported_with_its_line(named: tuple[str, str]) -> None:
     assert "fan  device 5" in done.stdout
 
 
+@pytest.mark.sweep
 def test_lost_line_does_not_stop_others_and_ctrl_c_ends_all() -> None:
     with simulated("atv71@1", "--tcp", "127.0.0.1:0") as first, tcp_line("atv71@5") as fan:
         settings(f"tcp:127.0.0.1:{port_of(first.ready)},timeout=0.2", fan)

@@ -34,6 +34,7 @@ def test_drive_that_answers_is_reported_as_healthy() -> None:
     assert reported["timeout"]["seconds"] == 10.0
 
 
+@pytest.mark.sweep
 def test_family_without_identification_is_diagnosed_by_its_profile() -> None:
     with tcp_line("powerdrive@2") as line:
         assert "Address 2 answers" in run(0, "why", line, "-d", "2")

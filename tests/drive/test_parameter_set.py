@@ -35,6 +35,7 @@ def read(text: str) -> ParameterSet:
 
 @settings(max_examples=25)
 @given(data=st.data())
+@pytest.mark.sweep
 def test_every_parameter_of_every_profile_survives_a_round_trip(data: st.DataObject) -> None:
     """Any word that a drive may return, also one without a name in the profile."""
     profile = library.load(data.draw(st.sampled_from(FAMILIES)))

@@ -79,6 +79,7 @@ def test_mypy_finds_wrong_uses_of_the_api(user: Path) -> None:
 
 
 @pytest.mark.parametrize("number", kept(range(len(EXAMPLES)), 0, 4))
+@pytest.mark.sweep
 def test_script_of_the_page_runs_with_the_installed_package(user: Path, number: int) -> None:
     done = run(user, python(user), f"script_{number}.py")
     assert done.returncode == 0, done.stderr

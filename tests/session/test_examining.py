@@ -279,6 +279,7 @@ async def test_loss_of_each_second_request_is_not_healthy() -> None:
         assert (await found_on(line, reads=12)).rung == "lost"
 
 
+@pytest.mark.sweep
 async def test_two_drives_are_not_reported_as_one_behind() -> None:
     with opened({"twin": 1}, "rtu-tcp", seed=8) as line:
         assert (await found_on(line, None)).rung == "two-drives"
@@ -292,6 +293,7 @@ def test_surplus_replies_contradict_a_line_one_behind(second: int, rung: str) ->
     assert diagnosed(sight).rung == rung
 
 
+@pytest.mark.sweep
 async def test_line_one_behind_is_reported() -> None:
     with opened({"behind": 1}, "rtu-tcp") as line:
         assert (await found_on(line, None, 12)).rung == "behind"

@@ -429,6 +429,7 @@ async def test_repeated_run_word_does_not_undo_a_stop_of_another_client(
     assert await made.write(LFR, 120) == 0
 
 
+@pytest.mark.sweep
 async def test_drive_without_a_profile_is_only_read(bench: Make) -> None:
     leroy = DriveSpec("powerdrive", 1)
     made = bench(leroy, writes=allowed_codes("all"), commands=True)

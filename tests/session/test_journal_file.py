@@ -118,6 +118,7 @@ def test_partial_line_is_kept_and_marked(journal: Journal, half: bytes) -> None:
     assert half.startswith(damaged[1].text.encode()[:10])
 
 
+@pytest.mark.sweep
 def test_several_programs_write_whole_lines_without_loss(tmp_path: Path) -> None:
     command = [sys.executable, "-c", SEVERAL, str(tmp_path / "state")]
     programs = [

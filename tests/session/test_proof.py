@@ -188,6 +188,7 @@ def test_excluded_slot_may_start_again() -> None:
     rounds=st.integers(3, 8),
     seed=st.integers(0, 2**16),
 )
+@pytest.mark.sweep
 def test_only_true_assignments_are_confirmed(
     signal: list[Signal], behind: list[str], chosen: list[str], rounds: int, seed: int
 ) -> None:

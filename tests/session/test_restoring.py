@@ -80,6 +80,7 @@ async def restored(made: Bench, values: ParameterSet, options: Options) -> Resto
 
 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "powerdrive"))
+@pytest.mark.sweep
 async def test_restore_after_a_factory_reset_equals_the_backup(family: str) -> None:
     with bench(family, sets=known(family)) as made:
         values = await backed_up(made)
@@ -141,6 +142,7 @@ async def test_killed_restore_is_resumed(family: str) -> None:
         assert len(made.writes()) - before <= len(left.edits) + len(done.results)
 
 
+@pytest.mark.sweep
 async def test_lost_line_keeps_the_rest_and_the_resume_mark() -> None:
     with bench("atv71", sets=known("atv71")) as made:
         values = await backed_up(made)

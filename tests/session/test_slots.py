@@ -270,6 +270,7 @@ async def test_every_slot_is_confirmed_on_a_slow_line_with_moving_values(start: 
     monitor.stop()
 
 
+@pytest.mark.sweep
 async def test_pending_assignment_is_never_confirmed(start: Start) -> None:
     simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
     monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))

@@ -15,6 +15,7 @@ from tui.simulator import FaultRates
 
 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv31", "powerdrive"))
+@pytest.mark.sweep
 async def test_every_readable_parameter_is_read_correctly(family: str) -> None:
     with bench(family) as made:
         reported: list[tuple[int, int]] = []

@@ -566,6 +566,7 @@ def test_private_part_of_textual_is_unchanged(part: Part) -> None:
     assert still, reported
 
 
+@pytest.mark.sweep
 def test_every_used_private_part_has_a_check_in_its_module() -> None:
     used = {
         (path.removeprefix(f"{ROOM}/"), use.name)

@@ -101,6 +101,7 @@ def run(copy: Path, *arguments: str) -> str:
     return done.stdout
 
 
+@pytest.mark.sweep
 def test_added_screen_opens_by_its_digit_and_is_listed(copy: Path) -> None:
     import json
 

@@ -78,6 +78,7 @@ async def write(made: Bench) -> None:
     await made.pilot.press("y")
 
 
+@pytest.mark.sweep
 async def test_slots_are_picked_moved_written_and_verified() -> None:
     async with bench("atv71") as made:
         await to_blocks(made)
@@ -213,6 +214,7 @@ async def test_indirect_block_waits_for_a_reset() -> None:
         await until(made.pilot, lambda: "F875 FD01" in shown(made.app, "first"))
 
 
+@pytest.mark.sweep
 async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_confirmation() -> None:
     async with bench("atv21") as made:
         await to_blocks(made, "F875")

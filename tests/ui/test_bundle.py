@@ -53,6 +53,7 @@ def unzipped(file: Path) -> dict[str, str]:
         }
 
 
+@pytest.mark.sweep
 async def test_bundle_of_open_drives_has_the_screens_and_messages(tmp_path: Path) -> None:
     file = tmp_path / "new" / "a.zip"
     app = panel("demo", demo)

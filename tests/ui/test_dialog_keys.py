@@ -208,6 +208,7 @@ LETTERS = re.compile(r"(?:^|  )([^ -]) ")
 
 
 @pytest.mark.parametrize(("screen", "key"), [("3", "/"), ("7", "O"), ("7", "j"), ("1", "c")])
+@pytest.mark.sweep
 async def test_letters_typed_into_a_field_are_not_shown_as_keys(
     screen: str, key: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -327,6 +328,7 @@ def test_invalid_input_is_refused_and_ends_nothing(name: str) -> None:
         assert reported or text == "f", text[:20]
 
 
+@pytest.mark.sweep
 async def test_key_without_a_meaning_in_a_dialog_says_where_it_works(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

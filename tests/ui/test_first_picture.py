@@ -43,6 +43,7 @@ class FirstPicture(DrivePanelApp):
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 40), (60, 20), (200, 60)])
 @pytest.mark.parametrize("ports", [[], [("/dev/ttyUSB0", "USB-RS485 adapter")]])
+@pytest.mark.sweep
 async def test_late_fields_do_not_change_the_first_picture(
     ports: list[tuple[str, str]], size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

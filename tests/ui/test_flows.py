@@ -107,6 +107,7 @@ async def test_drive_is_selected_monitored_and_left() -> None:
         await until(pilot, lambda: not screen.console.monitor.running)
 
 
+@pytest.mark.sweep
 async def test_keys_select_the_next_and_previous_drive() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:

@@ -175,6 +175,7 @@ async def test_status_bar_is_updated_during_a_question() -> None:
 
 
 @pytest.mark.parametrize("part", ["said", "strip", "state", "top"])
+@pytest.mark.sweep
 async def test_closing_screen_is_not_drawn(part: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """When the panel ends the parts go one by one, and the next look may come between."""
     async with panel() as made:

@@ -127,6 +127,7 @@ async def test_shown_frames_are_saved_as_text(tmp_path: Path) -> None:
         assert "filter: 1 read" in text
 
 
+@pytest.mark.sweep
 async def test_counters_of_the_open_drive_are_shown_for_both_sides() -> None:
     async with on_frames() as made:
         await made.pilot.press("tab", "tab")

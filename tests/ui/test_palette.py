@@ -66,6 +66,7 @@ def test_best_match_comes_first() -> None:
 
 
 @pytest.mark.parametrize("screen", kept(EVERYWHERE, "line", "monitor", "control"))
+@pytest.mark.sweep
 def test_every_action_is_found_on_every_screen(screen: str) -> None:
     for action in ACTIONS:
         if action.id.startswith(NOT_FOUND):
@@ -159,6 +160,7 @@ async def test_arming_and_stopping_work_by_name() -> None:
         await made.stopped(2)
 
 
+@pytest.mark.sweep
 async def test_action_of_the_current_screen_is_executed() -> None:
     async with bench("atv71") as made:
         options = await typed(made, "rated current")

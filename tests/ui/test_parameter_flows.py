@@ -132,6 +132,7 @@ async def test_parameter_is_found_edited_written_and_verified() -> None:
         assert made.drive().raw("ACC") == 75
 
 
+@pytest.mark.sweep
 async def test_u_undoes_the_last_edit_and_delete_the_selected_one() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)
@@ -151,6 +152,7 @@ async def test_u_undoes_the_last_edit_and_delete_the_selected_one() -> None:
         assert writes(made.app) == []
 
 
+@pytest.mark.sweep
 async def test_edit_messages_are_true_while_the_motor_runs() -> None:
     """TFR waits for a standstill: nothing says that w writes it, and it is counted until it is."""
     async with bench("atv71") as made:
@@ -188,6 +190,7 @@ async def test_edit_messages_are_true_while_the_motor_runs() -> None:
         )
 
 
+@pytest.mark.sweep
 async def test_parameter_is_found_from_every_screen() -> None:
     async with bench("atv312") as made:
         for key in "2567":
@@ -310,6 +313,7 @@ async def test_leaving_with_staged_edits_asks_first() -> None:
         await until(made.pilot, lambda: "1 staged" in shown(made.app, "status"))
 
 
+@pytest.mark.sweep
 async def test_backup_is_compared_staged_and_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -351,6 +355,7 @@ async def test_file_that_is_not_a_set_is_reported_and_stages_nothing(
         assert "staged" not in shown(made.app, "status")
 
 
+@pytest.mark.sweep
 async def test_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     async with bench("atv312") as made:
@@ -382,6 +387,7 @@ async def test_report_has_the_trend_of_the_last_run_beside_it(
         assert "<polyline" in read(Path("pump-run.svg"))
 
 
+@pytest.mark.sweep
 async def test_panel_follows_a_drive_to_its_new_address() -> None:
     async with bench("atv71") as made:
         await to_parameters(made)
@@ -538,6 +544,7 @@ async def test_quitting_offers_to_save_what_is_not_in_eeprom() -> None:
         await until(made.pilot, lambda: "1 write from this computer" in picture(made.app))
 
 
+@pytest.mark.sweep
 async def test_s_in_write_results_asks_to_save() -> None:
     async with bench("atv71") as made:
         screen = await to_parameters(made)
@@ -576,6 +583,7 @@ def files_of(folder: Path) -> list[Path]:
     return sorted(folder.glob("*.toml"))
 
 
+@pytest.mark.sweep
 async def test_backup_by_one_key_is_the_newest_to_compare_with(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -33,6 +33,7 @@ LOOKED_AT = ("1", "2", "question_mark", "escape", "ctrl+p", "escape", "m", "esca
 
 @pytest.mark.parametrize("terminal", POOR)
 @pytest.mark.parametrize("name", kept(["running", "fault", "run"], "fault"))
+@pytest.mark.sweep
 def test_monitor_on_a_poor_terminal(
     snap_compare: Compare, name: str, terminal: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -61,6 +62,7 @@ def test_monitor_on_a_small_poor_terminal(
 @pytest.mark.parametrize("terminal", FEWER_COLORS)
 @pytest.mark.parametrize("size", [(80, 24), (60, 16)], ids=lambda size: f"{size[0]}x{size[1]}")
 @pytest.mark.parametrize("state", kept(["thirty-one", "lost-drive"], "thirty-one"))
+@pytest.mark.sweep
 def test_list_of_drives_on_a_poor_terminal(
     snap_compare: Compare, state: str, size: tuple[int, int], terminal: str
 ) -> None:
@@ -82,6 +84,7 @@ def test_faults_on_a_poor_terminal(
 
 
 @pytest.mark.parametrize("terminal", ["plain signs", "vt100"])
+@pytest.mark.sweep
 async def test_plain_symbols_are_ascii_on_every_screen(
     terminal: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -29,6 +29,8 @@ NOW = re.compile(r"[\d.]+(?= \w+$)", re.MULTILINE)
 """Present values of Faults: live ones are of the last cycle, though another read may be newer."""
 SMALL_CURVE = re.compile(r" *\d* *[┤│└├].*$", re.MULTILINE)
 """Curve of Faults: its first second is not regular either."""
+FULL_READ = re.compile(r"─+ (?:reading \d+ of \d+ · )?")
+"""Progress of the read of all settings, which has a pace of its own, and the rule before it."""
 CYCLE = 0.5
 SETTLED = 0.15
 """Seconds after the end of a cycle: that of a replay ends a moment later than the recorded one."""
@@ -48,7 +50,7 @@ def texts_of(app: DrivePanelApp) -> dict[str, str]:
     for part in app.screen.query(Lines).results():
         lines = "\n".join(line.plain.rstrip() for line in part.lines)
         if part.id not in FRAME:
-            found[str(part.id)] = OF_CURVE.sub("", lines)
+            found[str(part.id)] = FULL_READ.sub("─ ", OF_CURVE.sub("", lines))
     return found
 
 

@@ -66,6 +66,7 @@ PLACES = [*SCREENS, *DIALOGS]
 
 
 @pytest.mark.parametrize("place", kept(PLACES, *PLACES[::12]))
+@pytest.mark.sweep
 async def test_screens_survive_awkward_sizes(place: str, monkeypatch: pytest.MonkeyPatch) -> None:
     await resizes(monkeypatch, [*AWKWARD, *random_sizes(3, PLACES.index(place))], place)
 

@@ -50,6 +50,7 @@ async def two_readings(
         await made.message(code, "1 count is" if text == second[1] else "another value")
 
 
+@pytest.mark.sweep
 async def test_two_readings_set_the_scale_and_a_disagreeing_third_discards_it() -> None:
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot
@@ -123,6 +124,7 @@ async def test_l_on_a_scaled_parameter_says_that_its_scale_is_known() -> None:
         assert not isinstance(app.screen, Ask)
 
 
+@pytest.mark.sweep
 async def test_learned_preset_is_suggested_confirmed_and_used_to_run() -> None:
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot

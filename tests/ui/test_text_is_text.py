@@ -250,6 +250,7 @@ QUESTION_CLASSES = {
 
 
 @pytest.mark.parametrize("name", kept(WAYS, "rating", "inputs"))
+@pytest.mark.sweep
 async def test_markup_in_every_field_is_text(name: str) -> None:
     family, way = WAYS[name]
     async with bench(family) as made:
@@ -325,6 +326,7 @@ def panel() -> None:
 
 
 @pytest.mark.skipif(not hasattr(pty, "fork"), reason="no pseudo-terminals here")
+@pytest.mark.sweep
 def test_drive_name_does_not_control_terminal() -> None:
     process, terminal = pty.fork()
     if process == 0:

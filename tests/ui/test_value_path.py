@@ -27,6 +27,7 @@ HANDED_OVER = {("bus/schedule/dispatcher", "bus/line"): "Reply"}
 """The answer of a job, which is a future: the loop hands it over, not a call."""
 
 
+@pytest.mark.sweep
 async def test_value_passes_few_modules_and_objects(monkeypatch: pytest.MonkeyPatch) -> None:
     class Mains(Simulation):
         def start(self) -> None:

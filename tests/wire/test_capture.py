@@ -84,6 +84,7 @@ def test_tshark_decodes_modbus_tcp_without_configuration(peer: Peer, tmp_path: P
     assert [row[1:4] for row in found[0:-1:2]] == [item[1:4] for item in found[1::2]]
 
 
+@pytest.mark.sweep
 def test_tshark_finds_values_and_no_errors_in_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
     path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
     program = peer("tshark", "tshark")

@@ -44,10 +44,10 @@ def read_small(path: Path, longest: int = LONGEST_TEXT) -> bytes:
 
 def read_small_text(path: Path, longest: int = LONGEST_TEXT) -> str:
     """Read a text file, with line ends as `\\n`. Raises OSError and UnicodeDecodeError."""
-    return text_of(read_small(path, longest))
+    return decoded_text(read_small(path, longest))
 
 
-def text_of(data: bytes) -> str:
+def decoded_text(data: bytes) -> str:
     """Decode a text, with line ends as `\\n`. Raises UnicodeDecodeError."""
     return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
 

@@ -16,7 +16,7 @@ from typing import Any
 import tomli
 
 from ..errors import ProfileError
-from ..small_file import encoding_fault, read_small, text_of
+from ..small_file import decoded_text, encoding_fault, read_small
 from ..toml_text import toml_tables
 from .toml_lines import TomlPath, toml_lines
 
@@ -118,7 +118,7 @@ def source_text(path: Path) -> SourceText:
         raise ProfileError(f"{path}: cannot be read: {error.strerror}.") from error
     if fault := encoding_fault(data):
         raise ProfileError(f"{path}:{fault}")
-    return SourceText(str(path), text_of(data))
+    return SourceText(str(path), decoded_text(data))
 
 
 def parsed(source: SourceText) -> dict[str, Any]:
