@@ -285,7 +285,7 @@ DEFECTS = (
     Defect(
         "standstill-by-the-state-alone",
         "tui/session/command",
-        "if not hertz and kind in STANDING:",
+        'if not hertz and kind in STANDING and (hertz == 0 or kind != "stopping"):',
         "if kind in STANDING:",
         "A motor that coasts at full speed is reported as stopped.",
         (f"{STOP}::test_coasting_motor_is_not_stopped_before_standstill",),
@@ -293,7 +293,7 @@ DEFECTS = (
     Defect(
         "standstill-by-the-frequency-alone",
         "tui/session/command",
-        "if not hertz and kind in STANDING:",
+        'if not hertz and kind in STANDING and (hertz == 0 or kind != "stopping"):',
         "if not hertz:",
         "A motor that is enabled at 0 Hz is reported as stopped.",
         (f"{STOP}::test_enabled_motor_at_0_hz_is_not_reported_as_stopped",),

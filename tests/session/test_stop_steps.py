@@ -342,10 +342,24 @@ async def test_motor_is_reported_as_run_by_others_only_while_it_runs(
     assert here.stop._unheeded is False
 
 
+async def test_motor_of_unknown_frequency_stands_only_once_its_state_says_so(
+    journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    here = OneStop(Ramp(OwnTime(), 0.0), journal)
+    moves: Moves = [("stopping", 20.0), ("stopping", None), ("stopping", None), ("stopped", None)]
+    assert await follow(here, moves, monkeypatch) is None
+    assert [phase for phase, *_ in here.reports] == [Phase.STOPPING] * 3 + [Phase.STOPPED]
+    monkeypatch.setattr(motor_stop, "STOP_FOLLOWED_FOR", 1.0)
+    for hertz, text in ((None, motor_stop.MAY_TURN), (1.0, motor_stop.STILL_TURNS), (0.0, None)):
+        here.stop.ordered = here.drive.clock.now
+        assert await follow(here, [("stopping", hertz)], monkeypatch) == text
+
+
 @pytest.mark.parametrize(
     ("constant", "seconds", "moves", "ends"),
     [
         ("STOP_FOLLOWED_FOR", 1.0, [("stopping", 1.0)], 1001.0),
+        ("STOP_FOLLOWED_FOR", 1.0, [("stopping", None)], 1001.0),
         ("TAKES_EFFECT", 0.5, [("running", 30.0)], 1000.75),
         ("TAKES_EFFECT", 0.5, [("running", None)], 1000.75),
         ("TAKES_EFFECT", 0.5, [("running", 0.0)], 1000.75),

@@ -39,6 +39,8 @@ from .stop_report import Phase, not_proved, not_stopped
 
 log = logging.getLogger(__name__)
 
+STILL_TURNS = "it still turns after a minute."
+MAY_TURN = "it may still turn after a minute: its output frequency was not read."
 STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
 """Kinds of state in which a motor at 0 Hz is not enabled, and so is stopped."""
 
@@ -251,11 +253,13 @@ class MotorStop:
         """Follow the motor to standstill; return why it does not stop, or None."""
         with suppress(NoAnswer, ChecksumFault, WrongReply):  # BytesSwapped ends it: values are void
             await check_byte_order(self.reader, Priority.OPERATOR_READ)
-        progress, before = self.session.clock.monotonic(), None
+        progress, before, unknown = self.session.clock.monotonic(), None, False
         ending = last_word(chart, order)
         while (now := self.session.clock.monotonic()) - self.ordered < STOP_FOLLOWED_FOR:
             kind, hertz = await self._motion(chart)
-            if not hertz and kind in STANDING:
+            unknown = hertz is None
+            # a motor that slows down with an unknown frequency is not known to stand
+            if not hertz and kind in STANDING and (hertz == 0 or kind != "stopping"):
                 self._tell_standing()
                 self.session.request_full_read()
                 return None
@@ -280,7 +284,7 @@ class MotorStop:
             what = f"{order.name}, {hertz:g} Hz" if hertz else order.name
             self.say(self.session, Phase.STOPPING, self._with_way(what), self.ordered)
             await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
-        return "it still turns after a minute."
+        return MAY_TURN if unknown else STILL_TURNS
 
     def _tell_standing(self) -> None:
         """Report standstill; with a guessed profile, the values prove nothing."""
