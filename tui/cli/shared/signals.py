@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 import signal
@@ -76,6 +77,25 @@ def _complain(text: str) -> None:
     say_beside(f"drivepanel: {text} {PRESS_CTRL_C}", err=True)
 
 
+class Arrivals:
+    """Numbers of the signals that have come, and which of them was the first.
+
+    A handler may be interrupted by the next signal between any two of its steps: two programs that
+    see the end of one terminal send two signals at once. To count in one step, and to decide by
+    that count, keeps one of them the first.
+    """
+
+    def __init__(self) -> None:
+        self.numbers: list[int] = []
+        self._order = itertools.count()
+
+    def note(self, number: int) -> bool:
+        """Note a signal; True for the first one."""
+        first = next(self._order) == 0
+        self.numbers.insert(0, number) if first else self.numbers.append(number)
+        return first
+
+
 class Stoppable(Protocol):
     """The panel as far as its end needs it."""
 
@@ -97,7 +117,7 @@ def ending_by_signal(panel: Stoppable, *, stop: bool) -> Iterator[list[int]]:
     The number of the first signal is handed out. A hangup ends the panel even if it is ignored: a
     panel without its terminal commands nothing. After an internal error SIGINT changes nothing.
     """
-    came: list[int] = []
+    came = Arrivals()
     ended = threading.Event()
 
     def end(number: int) -> None:
@@ -124,14 +144,13 @@ def ending_by_signal(panel: Stoppable, *, stop: bool) -> Iterator[list[int]]:
     def handle(number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGINT and panel.failed:
             return
-        came.append(number)
-        if len(came) == 1:
+        if came.note(number):
             # in a thread: the main one may be stuck with a terminal that takes nothing any more
             threading.Thread(target=end, args=(number,), name="end").start()
 
     with handled(handle, always="SIGHUP"):
         try:
-            yield came
+            yield came.numbers
         finally:
             ended.set()
 
@@ -147,13 +166,13 @@ def cancelled_by_signal(task: asyncio.Task[object]) -> Iterator[list[int]]:
     The same signal a second time ends the process at once, as it would have; others that follow
     the first one change nothing.
     """
-    came: list[int] = []
+    came = Arrivals()
     loop = task.get_loop()
 
     def handle(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
+        first = came.note(number)
         signal.signal(number, signal.SIG_DFL)
-        if len(came) > 1:
+        if not first:
             return
         last_resort = threading.Timer(LAST_WORDS, os._exit, (BY_SIGNAL + number,))
         last_resort.daemon = True
@@ -161,7 +180,7 @@ def cancelled_by_signal(task: asyncio.Task[object]) -> Iterator[list[int]]:
         loop.call_soon_threadsafe(task.cancel)
 
     with handled(handle, but="SIGINT"):
-        yield came
+        yield came.numbers
 
 
 @contextmanager
@@ -172,17 +191,16 @@ def interrupted_by_signal() -> Iterator[list[int]]:
     """
     from .errors import Failure
 
-    came: list[int] = []
+    came = Arrivals()
 
     def handle(number: int, _frame: FrameType | None) -> None:
-        came.append(number)
-        if len(came) == 1:
+        if came.note(number):
             raise KeyboardInterrupt
 
     try:
         with handled(handle, but="SIGINT"):
-            yield came
+            yield came.numbers
     except KeyboardInterrupt:
-        if not came:
+        if not (numbers := came.numbers):
             raise
-        raise Failure(f"Ended by {signal_name(came[0])}.", BY_SIGNAL + came[0]) from None
+        raise Failure(f"Ended by {signal_name(numbers[0])}.", BY_SIGNAL + numbers[0]) from None
