@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 
 import pytest
@@ -99,3 +100,10 @@ def test_family_without_identification_contradicts_no_profile(family: str) -> No
 def test_absent_drive_exits_with_3() -> None:
     with tcp_line("powerdrive@1") as line:
         refused(3, "read", line, "10.40", "-p", "powerdrive", "-d", "9")
+
+
+@pytest.mark.parametrize("family", ["powerdrive", "v20"])
+def test_simulated_drive_that_does_not_identify_itself_has_the_profile_of_its_line(
+    family: str,
+) -> None:
+    assert json.loads(run(0, "status", f"sim:{family}", "--json"))["profile"] == family

@@ -261,7 +261,7 @@ def usual_settings(profile_id: str | None) -> UsualSettings | None:
 
 
 async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
-    """A session with the drive, by the profile of -p, else by that of its identity.
+    """A session with the drive, by the profile of -p, else by that of its identity or line.
 
     Raises UsageError with advice if the drive does not identify itself, Contradiction if its
     identity contradicts the profile.
@@ -278,9 +278,11 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
         reported = await own_words(opened.line, target.device, profile)
     else:
         reported = await identify_drive(opened.line, target.device)
-        if reported.profile is None:
+        # a simulated line names its profiles; some families cannot be identified
+        known = reported.profile or opened.profiles.get(target.device)
+        if known is None:
             raise unidentified(reported)
-        profile = library.load(reported.profile)
+        profile = library.load(known)
     session = DriveSession(opened.line, target.device, profile, reported)
     if session.contradiction:
         _believe_the_person(session, target)
