@@ -350,7 +350,11 @@ async def test_motor_of_unknown_frequency_stands_only_once_its_state_says_so(
     assert await follow(here, moves, monkeypatch) is None
     assert [phase for phase, *_ in here.reports] == [Phase.STOPPING] * 3 + [Phase.STOPPED]
     monkeypatch.setattr(motor_stop, "STOP_FOLLOWED_FOR", 1.0)
-    for hertz, text in ((None, motor_stop.MAY_TURN), (1.0, motor_stop.STILL_TURNS), (0.0, None)):
+    for hertz, text in (
+        (None, motor_stop.STANDSTILL_UNKNOWN),
+        (1.0, motor_stop.STILL_TURNS),
+        (0.0, None),
+    ):
         here.stop.ordered = here.drive.clock.now
         assert await follow(here, [("stopping", hertz)], monkeypatch) == text
 

@@ -40,7 +40,7 @@ from .stop_report import Phase, not_proved, not_stopped
 log = logging.getLogger(__name__)
 
 STILL_TURNS = "it still turns after a minute."
-MAY_TURN = "it may still turn after a minute: its output frequency was not read."
+STANDSTILL_UNKNOWN = "it may still turn after a minute: its output frequency was not read."
 STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
 """Kinds of state in which a motor at 0 Hz is not enabled, and so is stopped."""
 
@@ -284,7 +284,7 @@ class MotorStop:
             what = f"{order.name}, {hertz:g} Hz" if hertz else order.name
             self.say(self.session, Phase.STOPPING, self._with_way(what), self.ordered)
             await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
-        return MAY_TURN if unknown else STILL_TURNS
+        return STANDSTILL_UNKNOWN if unknown else STILL_TURNS
 
     def _tell_standing(self) -> None:
         """Report standstill; with a guessed profile, the values prove nothing."""
