@@ -48,6 +48,8 @@ RESULT_LABELS = {
     "deficient": "Deficiency ...",
     "skip": "Skip with a reason ...",
 }
+ROWS_WITHOUT_LABEL = {*RESULT_LABELS, "turned", "parameter"}
+"""Kinds of rows that have no label before a value."""
 ACTION_LABELS = {
     "reference": "Reference on plate",
     "run": "Run the motor",
@@ -227,7 +229,8 @@ def _row(view: StartUpView, row: StepRow, width: int, chosen: bool) -> Text:
         text.append_text(_parameter(view, row.key, width))
     else:
         entry = record.entries.get(row.key, "")
-        labels = [_label(view, other) for other in view.start_up.rows if other.field is not None]
+        named = (each for each in view.start_up.rows if each.kind not in ROWS_WITHOUT_LABEL)
+        labels = [_label(view, other) for other in named]
         longest = max([LABEL_WIDTH, *map(len, labels)])
         text.append(cut(_label(view, row), min(longest, width - VALUE_ROOM)), PLAIN)
         if row.kind in ("save", "report"):
@@ -262,7 +265,9 @@ def _label(view: StartUpView, row: StepRow) -> str:
 
 def _parameter(view: StartUpView, code: str, width: int) -> Text:
     name = view.profile[code].name
-    text = Text(f"{code:<6}", STRONG).append(f" {cut(name, NAME_WIDTH)} ", PLAIN)
+    text = Text(f"{code:<6}", STRONG).append(
+        f" {cut(name, max(NAME_WIDTH, width - 9 - 2 * VALUE_ROOM))} ", PLAIN
+    )
     text.append_text(_value(view, code))
     if code in view.staged:
         text.append(f"  staged {view.staged[code]}", ATTENTION)

@@ -17,6 +17,8 @@ from .traces import MarkValues
 NAME_CELLS = 11
 WIDE, NARROW = 100, 79
 """Least widths of the table with the present values, and with the values of both marks."""
+MORE_SLOPE_DIGITS = 2
+"""Decimals of a slope beyond those of its value: 0.9 A less in 18 s is -0.050 A/s."""
 REDUCED_SIGN = "~"
 """Before a mean of several replies."""
 VALUE_COLUMNS = {
@@ -86,7 +88,8 @@ def _cells(row: TableRow) -> dict[str, str]:
             apart = (second.mean or 0.0) - first.mean
             difference = _signed(apart, row.digits)
             if row.seconds:
-                slope = _signed(apart / row.seconds, row.digits)
+                # a slow change must not read as none
+                slope = _signed(apart / row.seconds, row.digits + MORE_SLOPE_DIGITS)
     found = {
         "now": row.now or NOT_AVAILABLE,
         "cursor": point_text(row.cursor, row) if row.at_cursor else "",
