@@ -52,6 +52,8 @@ SCREENS: dict[str, tuple[bytes, ...]] = {
     "Faults": (b"5",),
     "Control": (b"6",),
     "Frames": (b"7",),
+    "Trend": (b"8",),
+    "Start-up": (b"B",),
     "Messages": (b"m",),
     "Help": (b"?",),
     "palette": (b"\x10",),

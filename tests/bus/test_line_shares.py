@@ -338,6 +338,18 @@ async def test_reply_is_due_after_its_exchange_was_cut_short() -> None:
     assert isinstance(job.answer.exception(0), LineClosed)
 
 
+async def fails_internally(line: TimedLine, word: int | None, text: str, *, unknown: bool) -> None:
+    """An internal error fails the request in progress, and ends the serving."""
+    line.end = math.inf
+    job = line.ask(Priority.OPERATOR_WRITE, word=word)
+    with pytest.raises(ZeroDivisionError):
+        await line.dispatcher.serve(line)  # type: ignore[arg-type]
+    error = job.answer.exception(0)
+    assert isinstance(error, LineFailed)
+    assert str(error).startswith(f"{text}: ZeroDivisionError('on purpose').")
+    assert str(error).endswith(OUTCOME_UNKNOWN) is unknown
+
+
 @pytest.mark.parametrize(("word", "unknown"), [(None, False), (7, True)])
 async def test_internal_error_during_an_exchange_fails_its_request(
     word: int | None, unknown: bool
@@ -349,14 +361,7 @@ async def test_internal_error_during_an_exchange_fails_its_request(
         raise ZeroDivisionError("on purpose")
 
     line.exchange = breaks  # type: ignore[method-assign]
-    line.end = math.inf
-    job = line.ask(Priority.OPERATOR_WRITE, word=word)
-    with pytest.raises(ZeroDivisionError):
-        await line.dispatcher.serve(line)  # type: ignore[arg-type]
-    error = job.answer.exception(0)
-    assert isinstance(error, LineFailed)
-    assert str(error).startswith("The request failed: ZeroDivisionError('on purpose').")
-    assert str(error).endswith(OUTCOME_UNKNOWN) is unknown
+    await fails_internally(line, word, "The request failed", unknown=unknown)
 
 
 # -- one request, with each part of the dispatcher set by the test ---------------------------------
@@ -789,11 +794,4 @@ async def test_internal_error_in_judging_a_reply_fails_its_request(
         raise ZeroDivisionError("on purpose")
 
     monkeypatch.setattr(line.dispatcher.steps, "end_form", breaks)
-    line.end = math.inf
-    job = line.ask(Priority.OPERATOR_WRITE, word=word)
-    with pytest.raises(ZeroDivisionError):
-        await line.dispatcher.serve(line)  # type: ignore[arg-type]
-    error = job.answer.exception(0)
-    assert isinstance(error, LineFailed)
-    assert str(error).startswith("The reply could not be judged: ZeroDivisionError('on purpose').")
-    assert str(error).endswith(OUTCOME_UNKNOWN) is unknown
+    await fails_internally(line, word, "The reply could not be judged", unknown=unknown)
