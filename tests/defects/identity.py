@@ -99,15 +99,15 @@ DEFECTS = (
     Defect(
         "first-word-of-one-family-only",
         "tui/drive/first_stop.py",
-        "_stopped_by(other, place.address, word, raws) for other in may_be",
-        "_stopped_by(other, place.address, word, raws) for other in may_be[:1]",
+        "_stopped_by(other, place.address, values, raws) for other in may_be",
+        "_stopped_by(other, place.address, values, raws) for other in may_be[:1]",
         "The stop word of one family runs the motor of another.",
         (FIRST,),
     ),
     Defect(
         "unsaid-drive-followed-by-any-family",
         "tui/drive/first_stop.py",
-        "if alone is not None and alone.word == what.word:",
+        "if alone is not None and alone.values == what.values:",
         "if alone is not None:",
         "The stop for the named family starts a motor that was just stopped.",
         (FIRST,),

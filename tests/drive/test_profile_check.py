@@ -116,10 +116,32 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
         "no state of the kind running",
         "states = [\n",
     ),
-    "a command word of 32 bits": (
+    "a command with bits that a word of 16 bits lacks": (
+        [('"Stop", words = [0] }', '"Stop", words = [0x20000] }')],
+        "order stop: 0x20000 has more bits than CTRL of type uint16.",
+        'id = "stop"',
+    ),
+    "a negative command word of 32 bits": (
+        [
+            ("address = 300\n", 'address = 300\ntype = "uint32"\n'),
+            ('"Stop", words = [0] }', '"Stop", words = [-2] }'),
+        ],
+        "order stop: -2 is negative. Write the 32 bits of CTRL in hexadecimal.",
+        'id = "stop"',
+    ),
+    "a stop of 32 bits that is a start": (
+        [
+            ("address = 300\n", 'address = 300\ntype = "uint32"\n'),
+            ('"Run", words = [1]', '"Run", words = [0x10001]'),
+            ('"Stop", words = [0] }', '"Stop", words = [0x10001] }'),
+        ],
+        "order stop: its word 0x10001 is also that of forward",
+        'id = "stop"',
+    ),
+    "a command word of 32 bits without function 16": (
         [("address = 300\n", 'address = 300\ntype = "uint32"\n')],
-        "CTRL has 32 bits. A command word has 16 bits",
-        'command = "CTRL"',
+        "CTRL: two words are written by function 16",
+        'access = "rw"\ngroup = "Command"',
     ),
     "a status word with a fraction": (
         [("address = 100\n", 'address = 100\ntype = "float32"\nscale = "0.1"\n')],

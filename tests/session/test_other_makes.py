@@ -11,13 +11,17 @@ from click.testing import CliRunner
 from tests.mixer import COMMAND, HERTZ, MIXER, installed_mixer
 from tui.cli.main import main
 from tui.drive.errors import ValueRefused
+from tui.drive.first_stop import blind_stops
+from tui.drive.foreign_write import WordKind, classify_words, half_refusal, starts_by
 from tui.drive.profile import library
+from tui.drive.profile.stop_profile import stop_profile_of
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.in_force import limits_in_force
 from tui.drive.settings.limits import edit_problems
 from tui.drive.shown import number_of, raw_of_text, shown
 from tui.drive.values import NOT_A_NUMBER, from_words, to_words
 from tui.simulator import DriveSpec, SimulatedDrive
+from tui.simulator.proving.proof_steps import prove_profile
 
 from .test_command import bench
 
@@ -172,3 +176,73 @@ def test_bits_above_15_are_shown_with_all_their_digits() -> None:
     assert drive.line_side.answer(1, struct.pack(">BHH", 3, 310, 2)) == struct.pack(
         ">BBHH", 3, 4, 1, 2
     )
+
+
+WIDE_COMMAND = (
+    ("address = 200\n", 'address = 230\ntype = "uint32"\nlow_word_first = false\n'),
+    ("words = [1]", "words = [0x10000]"),
+    ("words = [3]", "words = [0x30000]"),
+    ("words = [0]", "words = [0x80000001]"),
+)
+"""All run commands differ from the stop in bits 16 to 31 only, high word first."""
+WIDE = 230
+
+
+async def test_command_word_of_32_bits_runs_reverses_and_stops_in_whole_frames() -> None:
+    installed_mixer(HERTZ, "", *WIDE_COMMAND)
+    async with bench(MIXER) as made:
+        made.commander.run("forward", "20Hz")
+        assert await made.done() == "Run: Running"
+        await made.let_go_until(lambda: made.drive.motor.frequency > 19)
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+        await made.arm()
+        made.commander.run("reverse", "20Hz")
+        assert await made.done() == "Run reverse: Running"
+        await made.let_go_until(lambda: made.drive.motor.frequency < -19)
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+        written = [
+            frame.data[7:11].hex(" ", 2)
+            for frame in made.line.trace
+            if frame.direction == "out" and frame.data[1:4] == bytes([16, 0, WIDE])
+        ]
+    forward, stop, reverse = "0001 0000", "8000 0001", "0003 0000"
+    assert written == [forward, stop, reverse, stop]
+
+
+def test_prepared_and_first_stop_of_32_bits_have_both_words() -> None:
+    profile = installed_mixer(HERTZ, "", *WIDE_COMMAND)
+    (word,) = blind_stops([stop_profile_of(profile)])
+    assert (word.address, word.word, word.values) == (WIDE, 0x80000001, (0x8000, 1))
+    other = installed_mixer(HERTZ, "", ("address = 200\n", "address = 230\n"))
+    assert blind_stops([stop_profile_of(profile), stop_profile_of(other)]) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "kind", "start"),
+    [
+        ({WIDE: 0x8000, WIDE + 1: 1}, WordKind.STOP, None),
+        ({WIDE: 0x8000}, WordKind.COMMAND, "forward"),
+        ({WIDE + 1: 1}, WordKind.COMMAND, "forward"),
+        ({WIDE: 1, WIDE + 1: 0}, WordKind.COMMAND, "forward"),
+        ({WIDE: 3, WIDE + 1: 0}, WordKind.COMMAND, "reverse"),
+        ({WIDE: 1, WIDE + 1: 0x8000}, WordKind.COMMAND, "forward"),
+    ],
+)
+def test_half_of_a_command_word_of_32_bits_is_no_stop_of_a_client(
+    words: dict[int, int], kind: WordKind, start: str | None
+) -> None:
+    profile = installed_mixer(HERTZ, "", *WIDE_COMMAND)
+    found = classify_words(profile, words, {})
+    assert {word.kind for word in found} == {kind}
+    assert starts_by(profile, found) == start
+    half = half_refusal(profile["CTRL"], words)
+    assert bool(half) is (len(words) == 1)
+
+
+def test_profile_with_a_command_word_of_32_bits_proves_itself() -> None:
+    way = '[[references]]\nparameter = "REF"\nkind = "frequency"\n\n[[parameters]]\ncode = "STAT"'
+    ways = ('[[parameters]]\ncode = "STAT"', way)
+    profile = installed_mixer(HERTZ, "", *WIDE_COMMAND, ways)
+    assert {step.title: step.fault for step in prove_profile(profile) if step.fault} == {}

@@ -596,6 +596,8 @@ async def test_work_of_each_stop_has_its_name(
 class Way:
     """A way to stop with its register and words."""
 
+    type, shift, mask = "uint16", 0, 0xFFFF
+
     def __init__(self, address: int, *words: int, broadcast: bool = True) -> None:
         self.address, self.words, self.broadcast = address, words, broadcast
 

@@ -14,6 +14,7 @@ from .chart import state_of
 from .orders import GENTLE_FIRST
 from .profile.schema import Chart, Order, OrderId
 from .profile.stop_profile import StopProfile
+from .words import registers_of_word, unsigned
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +23,9 @@ class FirstWord:
 
     address: int
     word: int
+    """The bits of the command word, 16 or 32."""
+    values: tuple[int, ...]
+    """Words of the registers, in their order."""
     code: str
     """Name of the register in those families."""
     order: OrderId
@@ -133,12 +137,12 @@ def first_word(
                         continue
                     if _place(family, chart, order) != place.address:
                         continue
-                    word = order.words[0] & 0xFFFF
+                    values = _values(family, chart, order)
                     if _holds(order, chart, known) and all(
-                        _stopped_by(other, place.address, word, raws) for other in may_be
+                        _stopped_by(other, place.address, values, raws) for other in may_be
                     ):
-                        code = order.parameter or chart.command
-                        return FirstWord(place.address, word, code, way, may_be)
+                        word, code = unsigned(order.words[0]), order.parameter or chart.command
+                        return FirstWord(place.address, word, values, code, way, may_be)
     return None
 
 
@@ -151,7 +155,7 @@ def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tupl
     found = []
     for family in what.families:
         alone = first_word(StopPlace(what.address, (family,)), raws, wanted, (family.id,))
-        if alone is not None and alone.word == what.word:
+        if alone is not None and alone.values == what.values:
             found.append(family.id)
     return tuple(found)
 
@@ -166,13 +170,16 @@ def blind_stops(families: Sequence[StopProfile]) -> list[FirstWord]:
     return [word for word in found if word is not None] if all(found) else []
 
 
-def _stopped_by(family: StopProfile, address: int, word: int, raws: Mapping[int, int]) -> bool:
-    """Return True if a word stops a family in every chart that may be active."""
+def _stopped_by(
+    family: StopProfile, address: int, values: Sequence[int], raws: Mapping[int, int]
+) -> bool:
+    """Return True if a command stops a family in every chart that may be active."""
     known = _known(family, raws)
     charts = _charts(family, known)
     return bool(charts) and all(
         any(
-            [number & 0xFFFF for number in order.words] == [word]
+            len(order.words) == 1
+            and _values(family, chart, order) == values
             and _place(family, chart, order) == address
             and _holds(order, chart, known)
             for order in _stops(chart)
@@ -212,7 +219,16 @@ def _stops(chart: Chart) -> list[Order]:
 
 
 def _place(family: StopProfile, chart: Chart, order: Order) -> int | None:
-    return family.places.get(order.parameter or chart.command)
+    code = order.parameter or chart.command
+    pair = family.pairs.get(code)
+    return family.places.get(code) if pair is None else pair.address
+
+
+def _values(family: StopProfile, chart: Chart, order: Order) -> tuple[int, ...]:
+    """Return the registers of the first word of a command."""
+    pair = family.pairs.get(order.parameter or chart.command)
+    word = order.words[0]
+    return (word & 0xFFFF,) if pair is None else registers_of_word(pair, word)
 
 
 def _known(family: StopProfile, raws: Mapping[int, int]) -> dict[str, int]:

@@ -20,6 +20,7 @@ from .profile.profile import Profile, is_verified
 from .profile.schema import Chart, Order, Parameter
 from .settings.writable import cuts_line, is_order, is_setting, never_set
 from .values import check_raw, from_words, is_field, word_count
+from .words import unsigned
 
 ALL = "all"
 """Instead of codes: every setting that may be written without being named."""
@@ -62,15 +63,17 @@ def classify_words(
     profile: Profile, words: Mapping[int, int], raws: Mapping[str, int]
 ) -> list[ExternalWord]:
     """Return the effect of each word of a write, given raw values that were just read."""
-    return [_word(profile, address, word, raws) for address, word in words.items()]
+    return [_word(profile, address, words, raws) for address in words]
 
 
-def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) -> ExternalWord:
-    found = _places(profile).get(address, ())
+def _word(
+    profile: Profile, address: int, words: Mapping[int, int], raws: Mapping[str, int]
+) -> ExternalWord:
+    found, word = _places(profile).get(address, ()), words[address]
     if any(
         is_order(profile, parameter) or parameter.code in _ordered(profile) for parameter in found
     ):
-        stops = any(only_stops(profile, parameter, word, raws) for parameter in found)
+        stops = any(only_stops(profile, parameter, words, raws) for parameter in found)
         return ExternalWord(address, word, WordKind.STOP if stops else WordKind.COMMAND, found)
     if found and all(is_setting(profile, parameter) for parameter in found):
         return ExternalWord(address, word, WordKind.SETTING, found)
@@ -98,14 +101,33 @@ def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirecti
         )
     ]
     back = {
-        order.words[-1] & 0xFFFF
+        unsigned(order.words[-1])
         for chart in profile.data.charts
         for order in chart.orders
         if order.id == "reverse"
     }
     if not found:
         return None
-    return "reverse" if any(word.word in back for word in found) else "forward"
+    written = {word.address: word.word for word in found}
+    bits = {_bits(parameter, written) for word in found for parameter in word.parameters}
+    return "reverse" if bits & back else "forward"
+
+
+def _bits(parameter: Parameter, words: Mapping[int, int]) -> int | None:
+    """Return the bits that a write puts into all registers of a parameter; None for a part."""
+    own = registers_of(parameter)
+    if is_field(parameter) or any(address not in words for address in own):
+        return None
+    pair = [words[address] for address in own]
+    if len(pair) == 1:
+        return pair[0]
+    low, high = pair if parameter.low_word_first else reversed(pair)
+    return high << 16 | low
+
+
+def registers_of(parameter: Parameter) -> range:
+    """Return the addresses of a parameter's registers."""
+    return range(parameter.address, parameter.address + word_count(parameter))
 
 
 @lru_cache(maxsize=32)
@@ -115,19 +137,23 @@ def _ordered(profile: Profile) -> frozenset[str]:
     return frozenset(order.parameter for order in orders if order.parameter)
 
 
-def only_stops(profile: Profile, parameter: Parameter, word: int, raws: Mapping[str, int]) -> bool:
-    """Return True if a word stops the motor in every chart and state that may be active.
+def only_stops(
+    profile: Profile, parameter: Parameter, words: Mapping[int, int], raws: Mapping[str, int]
+) -> bool:
+    """Return True if the bits of a command word stop the motor in every chart and state that may
+    be active.
 
-    A stop of one chart runs the motor in another. So the result is False if a value that it depends
-    on is unknown.
+    A stop of one chart runs the motor in another, and half of 32 bits may do anything. So the
+    result is False if a value or a word that it depends on is unknown.
     """
+    own = {address: words[address] for address in registers_of(parameter) if address in words}
     charts = [
         chart
         for chart in profile.data.charts
         if chart.orders and (chart.when is None or chart.when.holds(raws) is not False)
     ]
     return bool(charts) and all(
-        any(_is_stop(profile, chart, order, parameter, word, raws) for order in chart.orders)
+        any(_is_stop(profile, chart, order, own, raws) for order in chart.orders)
         for chart in charts
     )
 
@@ -136,11 +162,10 @@ def _is_stop(
     profile: Profile,
     chart: Chart,
     order: Order,
-    parameter: Parameter,
-    word: int,
+    words: Mapping[int, int],
     raws: Mapping[str, int],
 ) -> bool:
-    if not _may_stop(profile, chart, order, {parameter.address: word}):
+    if not _may_stop(profile, chart, order, words):
         return False
     if not all(when.holds(raws) for when in order.when):
         return False
@@ -148,7 +173,8 @@ def _is_stop(
         status = raws.get(chart.status)
         if status is None or state_of(chart, status).id not in order.states:
             return False
-    return word in (order.words[0] & 0xFFFF, *with_options(chart, order, raws))
+    bits = _bits(order_target(profile, chart, order), words)
+    return bits in (unsigned(order.words[0]), *with_options(chart, order, raws))
 
 
 def _may_stop(profile: Profile, chart: Chart, order: Order, words: Mapping[int, int]) -> bool:
@@ -156,8 +182,8 @@ def _may_stop(profile: Profile, chart: Chart, order: Order, words: Mapping[int, 
     if order.id not in WAYS_TO_STOP or len(order.words) != 1:
         return False
     place = order_target(profile, chart, order)
-    word, own = words.get(place.address), order.words[0] & 0xFFFF
-    if word is None or is_field(place):
+    word, own = _bits(place, words), unsigned(order.words[0])
+    if word is None:
         return False
     optional = optional_bits(chart, place.code) if own else 0
     return word | optional == own | optional
@@ -180,7 +206,7 @@ def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]
         place = order_target(profile, chart, order)
         if order.states:
             codes.append(chart.status)
-        if words[place.address] != order.words[0] & 0xFFFF:
+        if _bits(place, words) != unsigned(order.words[0]):
             codes.append(place.code)
     return [
         code
@@ -219,13 +245,19 @@ def _named_only(profile: Profile) -> frozenset[str]:
     return frozenset({*cutting, *channels, *channel_codes(profile)})
 
 
+def half_refusal(parameter: Parameter, words: Mapping[int, int]) -> str:
+    """Return why half of a value is not written; empty if all its words were sent."""
+    if all(address in words for address in registers_of(parameter)):
+        return ""
+    return f"{parameter.code} has two words. Write both in one request."
+
+
 def value_refusal(profile: Profile, parameter: Parameter, words: Mapping[int, int]) -> str:
     """Return why a value is never written, or only half of it was sent; empty if it may be
     written."""
-    own = [parameter.address + offset for offset in range(word_count(parameter))]
-    if any(address not in words for address in own):
-        return f"{parameter.code} has two words. Write both in one request."
-    raw = from_words(parameter, [words[address] for address in own])
+    if why := half_refusal(parameter, words):
+        return why
+    raw = from_words(parameter, [words[address] for address in registers_of(parameter)])
     if why := never_set(profile, parameter, raw):
         return why
     try:

@@ -12,6 +12,7 @@ from .chart import state_of
 from .errors import DriveError
 from .profile.profile import Profile
 from .profile.schema import Chart, Interlock, Order, OrderId, Parameter, State, When
+from .words import unsigned
 
 GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
 """Stop commands that do not trip the drive, gentlest first."""
@@ -222,7 +223,7 @@ def with_options(chart: Chart, order: Order, raws: Mapping[str, int]) -> list[in
     """
     where = order.parameter or chart.command
     kept = raws.get(where, 0) & optional_bits(chart, where)
-    return [word & 0xFFFF | kept if word else 0 for word in order.words]
+    return [unsigned(word) | kept if word else 0 for word in order.words]
 
 
 def optional_bits(chart: Chart, code: str) -> int:

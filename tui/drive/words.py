@@ -84,6 +84,26 @@ def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[i
     return pair if parameter.low_word_first else (pair[1], pair[0])
 
 
+def type_bits(parameter: Parameter) -> int:
+    """Return all bits of the parameter's registers, set."""
+    return (1 << 16 * word_count(parameter)) - 1
+
+
+def unsigned(word: int) -> int:
+    """Return a command word as its bits; a negative one has 16."""
+    return word & 0xFFFF if word < 0 else word
+
+
+def raw_of_word(parameter: Parameter, word: int) -> int:
+    """Return the raw value of a command word of 16 or 32 bits."""
+    return word if word_count(parameter) == 2 else from_words(parameter, [word & 0xFFFF])
+
+
+def registers_of_word(parameter: Parameter, word: int) -> tuple[int, ...]:
+    """Return the registers that a command word is written to, in the order of the drive."""
+    return to_words(parameter, raw_of_word(parameter, word))
+
+
 def type_range(parameter: Parameter) -> tuple[int, int]:
     """Return the lowest and highest raw value that the parameter's type can hold."""
     width = 32 if parameter.type.endswith("32") else 16

@@ -16,11 +16,12 @@ import msgspec
 
 from ..errors import ProfileError
 from ..small_file import read_small_text
+from ..words import word_count
 from . import library
 from .converting import converted
 from .heads import section, shared_texts
 from .profile import Profile
-from .schema import Chart
+from .schema import Chart, Parameter
 
 _ROW = re.compile(r"^\[\[parameters\]\][ \t]*\n", re.MULTILINE)
 _CODE = re.compile(r"""^code = (["'])(.+)\1$""", re.MULTILINE)
@@ -38,6 +39,8 @@ class StopProfile:
     charts: tuple[Chart, ...]
     places: Mapping[str, int]
     """Address by code, of whole words that function 3 reads."""
+    pairs: Mapping[str, Parameter]
+    """Command words of 32 bits by code; no packaged family has one."""
     names_itself: bool
     """True if its drives support function 43; others do not answer reads of words that they
     lack."""
@@ -64,7 +67,7 @@ def _facts(listing: library.Listing) -> StopProfile | None:
         except ProfileError:
             return None
         return stop_profile_of(profile, names_itself=names_itself)
-    return StopProfile(listing.id, listing.name, charts, places, names_itself)
+    return StopProfile(listing.id, listing.name, charts, places, {}, names_itself)
 
 
 def stop_profile_of(profile: Profile, *, names_itself: bool = True) -> StopProfile:
@@ -74,7 +77,10 @@ def stop_profile_of(profile: Profile, *, names_itself: bool = True) -> StopProfi
         for parameter in profile.parameters
         if parameter.function == 3 and parameter.type.endswith("16") and parameter.mask == 0xFFFF
     }
-    return StopProfile(profile.id, profile.name, tuple(profile.data.charts), places, names_itself)
+    charts = tuple(profile.data.charts)
+    codes = {order.parameter or chart.command for chart in charts for order in chart.orders}
+    pairs = {code: profile[code] for code in codes if word_count(profile[code]) == 2}
+    return StopProfile(profile.id, profile.name, charts, places, pairs, names_itself)
 
 
 def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:

@@ -17,7 +17,8 @@ from tui.drive.orders import (
     with_options,
 )
 from tui.drive.profile.schema import Chart, Order, OrderId, State
-from tui.drive.values import from_words
+from tui.drive.values import hexadecimal
+from tui.drive.words import raw_of_word
 from tui.safety import STEP_TIME
 
 from ..drive import DriveSession
@@ -106,13 +107,13 @@ class CommandAccess(Writer):
             if parameter.code == chart.command:
                 await self.write_command(chart, word, order.name)
             else:
-                await self.write_parameter(parameter, from_words(parameter, [word]), why=order.name)
+                await self.write_parameter(parameter, raw_of_word(parameter, word), why=order.name)
 
     async def write_command(self, chart: Chart, word: int, why: str) -> None:
         """Write a command word, and poll it from then on."""
         parameter = self.session.profile[chart.command]
         # not compared: drives change their command word, and the state shows its effect
-        await self.write_parameter(parameter, from_words(parameter, [word]), why=why, check=0)
+        await self.write_parameter(parameter, raw_of_word(parameter, word), why=why, check=0)
         self.session.note_command()
         self.given.note_command(parameter.code, word)
 
@@ -169,9 +170,10 @@ class CommandHistory:
 
     def changed_words(self) -> str:
         """List command words that differ from the word that this program has written."""
-        known = self._session.image.raws
-        return ", ".join(
-            f"{code} 16#{raw:04X} is now 16#{known[code] & 0xFFFF:04X}"
-            for code, raw in self._written.items()
-            if code in known and known[code] & 0xFFFF != raw
-        )
+        known, profile = self._session.image.raws, self._session.profile
+        pairs = [
+            (code, hexadecimal(profile[code], word), hexadecimal(profile[code], known[code]))
+            for code, word in self._written.items()
+            if code in known
+        ]
+        return ", ".join(f"{code} {own} is now {now}" for code, own, now in pairs if own != now)

@@ -27,7 +27,8 @@ from tui.drive.orders import (
     order_target,
 )
 from tui.drive.profile.schema import CommandOption, ControlSource, Order, OrderId
-from tui.drive.values import check_raw, from_words
+from tui.drive.values import check_raw
+from tui.drive.words import raw_of_word, unsigned
 from tui.safety import ARMED_FOR, STATE_FRESH
 
 from ..drive import DriveSession
@@ -335,9 +336,9 @@ async def set_option(access: CommandAccess, option: CommandOption, bits: int) ->
     await access.read([chart.status])
     if option.stopped_only and state_of(chart, access.raws[chart.status]).kind in ENABLED_KINDS:
         raise OrderRefused(f"Not set: {option.name} is changed with the motor stopped only.")
-    word = reading.raw & 0xFFFF & ~option.mask | bits
+    word = unsigned(reading.raw) & ~option.mask | bits
     await access.write_parameter(
-        parameter, from_words(parameter, [word]), why=option.name, check=option.mask
+        parameter, raw_of_word(parameter, word), why=option.name, check=option.mask
     )
     access.session.note_command()
     access.given.note_option(parameter.code, word)

@@ -8,7 +8,7 @@ that selects its stop. Then one word is sent that stops all remaining families
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import DeviceException, ExchangeError, LineError, NoAnswer
@@ -27,6 +27,7 @@ ONE_WORD = Limits(
     functions=frozenset({3, 6, 43}), max_read=1, max_write=1, max_read_23=0, max_write_23=0
 )
 """Requests allowed to an unidentified drive."""
+STOP_OF_32_BITS = replace(ONE_WORD, functions=ONE_WORD.functions | {16}, max_write=2)
 FIRST_WHY = "stopped before it was identified"
 
 
@@ -174,8 +175,10 @@ async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> 
 async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord) -> SentFirst:
     """Write the word once, and record it in the journal whatever the result."""
     answer = reported = "interrupted by a signal: it is not known if the drive received it"
+    if len(what.values) > 1:
+        line.describe(device, STOP_OF_32_BITS)
     try:
-        await line.write(device, what.address, [what.word], priority=Priority.STOP)
+        await line.write(device, what.address, what.values, priority=Priority.STOP)
         answer = reported = "ok"
     except DeviceException as error:
         answer, reported = str(error), "refused"
@@ -188,6 +191,8 @@ async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord
         answer = reported = str(error)
         raise
     finally:
+        if len(what.values) > 1:
+            line.describe(device, ONE_WORD)
         journal.add(_entry(line, device, what, answer))
     return SentFirst(what, reported)
 
@@ -205,7 +210,7 @@ def _entry(line: ModbusLine, device: int, what: FirstWord, answer: str) -> Entry
         old_raw=None,
         old="",
         new_raw=what.word,
-        new=f"16#{what.word:04X}",
+        new=f"16#{what.word:0{4 * len(what.values)}X}",
         answer=answer,
         read_back=None,
         why=FIRST_WHY,

@@ -12,9 +12,10 @@ from functools import partial
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineError, LineFailed, LineLost
 from tui.bus.link import label
-from tui.bus.requests import WriteOne
+from tui.bus.requests import WriteMany, WriteOne
 from tui.drive.errors import DriveError
 from tui.drive.sentences import sentence
+from tui.drive.values import from_words
 
 from ..carry_on import carried_on
 from ..drive import DriveSession
@@ -97,17 +98,21 @@ class LastStop:
     def _record(self, session: DriveSession, why: str) -> None:
         session.reported_by_line = True
         for write in session.prepared:
-            if not isinstance(write.request, WriteOne):
+            request = write.request
+            if not isinstance(request, WriteOne | WriteMany):
                 continue
-            address, word = write.request.address, write.request.value
+            address = request.address
+            values = (request.value,) if isinstance(request, WriteOne) else request.values
             parameter = session.profile.at(address)
-            code = parameter.code if parameter is not None else str(address)
+            code, word = str(address), values[0]
             if parameter is not None:
+                code, word = parameter.code, from_words(parameter, values)
                 session.image.doubt(code)
+            text = " ".join(f"16#{value:04X}" for value in values)
             self._journal.add(
                 Entry(
                     now_text(), label(session.line.link), session.device, session.profile.id, code,
-                    address, None, "", word, f"16#{word:04X}", "not known", None, why,
+                    address, None, "", word, text, "not known", None, why,
                 )
             )  # fmt: skip
 

@@ -9,6 +9,7 @@ from tui.drive.chart import ENABLED_KINDS, read_chart
 from tui.drive.command_blocked import state_refusal
 from tui.drive.orders import OrderRefused, choose, walk
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter
+from tui.drive.values import hexadecimal
 
 from ..drive import DriveSession
 from ..starts.keeper import record_start
@@ -200,7 +201,7 @@ class MotorStart:
                 names = {s.id: s.name for s in chart.states}
                 raise NotFollowed(
                     f"The drive stays in {reached.name}: it does not go to {names[goal]}"
-                    f" after 16#{word:04X}."
+                    f" after {hexadecimal(self.session.profile[chart.command], word)}."
                 )
         if not way:
             self.sent = True

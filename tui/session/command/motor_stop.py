@@ -24,7 +24,7 @@ from tui.drive.orders import (
 )
 from tui.drive.profile.schema import Chart, Order, OrderId
 from tui.drive.profile.stop_profile import StopProfile
-from tui.drive.values import from_words
+from tui.drive.words import raw_of_word
 from tui.safety import STATE_FRESH, STOP_FOLLOWED_FOR, TAKES_EFFECT
 
 from ..connect.limits import limits_of
@@ -224,7 +224,7 @@ class MotorStop:
         kept = {code: reading.raw for code, reading in self.held.items() if reading.raw is not None}
         self._mark_commanded()
         for word in with_options(chart, order, kept):
-            raw = from_words(parameter, [word])
+            raw = raw_of_word(parameter, word)
             why = f"stopped: {order.name}"
             try:
                 await self.writer.write_parameter(

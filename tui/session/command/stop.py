@@ -34,6 +34,7 @@ from tui.drive.orders import (
 )
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
+from tui.drive.words import registers_of_word
 from tui.safety import STOP_TRIES
 
 from ..carry_on import carried_on
@@ -241,7 +242,7 @@ class Stopper:
 
     async def _broadcast(self, sessions: list[DriveSession], order: OrderId) -> None:
         """Broadcast the stop words that cannot start a drive of any family on the line."""
-        sent: set[tuple[int, int]] = set()
+        sent: set[tuple[int, tuple[int, ...]]] = set()
         for session in sessions:
             raws = session.image.trusted
             try:
@@ -251,14 +252,13 @@ class Stopper:
                 continue
             if chart is None or found is None or not found.broadcast:
                 continue
-            address = order_target(session.profile, chart, found).address
+            target = order_target(session.profile, chart, found)
             for word in found.words:
-                if (address, word) not in sent:
-                    sent.add((address, word))
+                place = (target.address, registers_of_word(target, word))
+                if place not in sent:
+                    sent.add(place)
                     limits = limits_of(session.profile)
-                    await self._line.broadcast(
-                        address, [word & 0xFFFF], limits=limits, priority=Priority.STOP
-                    )
+                    await self._line.broadcast(*place, limits=limits, priority=Priority.STOP)
 
     async def _stop(self, stop: MotorStop) -> None:
         try:

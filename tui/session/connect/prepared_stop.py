@@ -27,7 +27,7 @@ def prepared_stop(
         words = blind_stops([stop_profile_of(family) for family in families])
         limits = limits_of(families[0])
         return tuple(
-            prepared_write(line.link, limits, device, word.address, [word.word]) for word in words
+            prepared_write(line.link, limits, device, word.address, word.values) for word in words
         )
     except Exception:
         log.exception("no stop is prepared for device %s", device)

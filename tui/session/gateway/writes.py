@@ -25,7 +25,9 @@ from tui.drive.foreign_write import (
     StartDirection,
     WordKind,
     classify_words,
+    half_refusal,
     parameters_at,
+    registers_of,
     setting_refusal,
     starts_by,
     stop_deciding_codes,
@@ -130,6 +132,9 @@ class GatewayWrite:
             self._refuse(ILLEGAL_FUNCTION, f"no parameter can be written at {lacking}")
         if self._commands and not self._rules.commands:
             self._refuse(ILLEGAL_FUNCTION, "commands are not allowed; use --allow-commands")
+        for parameter in parameters_at([word for word in words if word.kind is WordKind.COMMAND]):
+            if why := half_refusal(parameter, self._requested.words):
+                self._refuse(ILLEGAL_VALUE, why)
         settings = [word for word in words if word.kind is WordKind.SETTING]
         for setting in settings:
             why = setting_refusal(self._session.profile, setting, self._rules.writes)
@@ -187,8 +192,10 @@ class GatewayWrite:
         self._line.pending.stops_by(self._write)
 
     async def _send_alone(self, item: ExternalWord) -> None:
-        """Send one word that stops."""
+        """Send one word that stops; both, if its parameter has two."""
         device = self._session.device
+        if item.address not in {parameter.address for parameter in item.parameters}:
+            return  # sent with the first word of its parameter
         word, send = (device, item.address, item.word), partial(self._send_alone_now, item)
         await self._line.turns.stopping(self._host, word, send)
         self._line.commanding.stopped_too(device, self._client)
@@ -196,9 +203,11 @@ class GatewayWrite:
     async def _send_alone_now(self, word: ExternalWord) -> None:
         self._stop()
         answer = ENDED_BEFORE_ANSWER
+        own = max((registers_of(parameter) for parameter in word.parameters), key=len)
+        values = [self._requested.words[address] for address in own]
         try:
             await self._session.line.write(
-                self._session.device, word.address, [word.word], priority=Priority.STOP
+                self._session.device, word.address, values, priority=Priority.STOP
             )
             answer = "ok"
             self._line.keep_resting(self._session)

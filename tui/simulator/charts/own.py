@@ -23,6 +23,7 @@ from tui.drive.profile.schema import (
     StatusBit,
     Transition,
 )
+from tui.drive.words import unsigned
 
 from ..body import Body, Fallback
 from ..plant.fault_history import OwnFault
@@ -104,7 +105,7 @@ class OwnOrders:
         for option in chart.options:
             if option.parameter == where.code:
                 kept |= option.mask
-        return (raw & 0xFFFF) & ~kept == (word & 0xFFFF) & ~kept
+        return unsigned(raw) & ~kept == unsigned(word) & ~kept
 
 
 MOST_CLEARED = 3

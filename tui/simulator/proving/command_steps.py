@@ -10,6 +10,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.rules.charts import RUN_ORDERS
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, ReferenceWay
 from tui.drive.profile.toml_lines import TomlPath
+from tui.drive.words import unsigned
 
 from .bench_motion import (
     REACHED_SECONDS,
@@ -73,9 +74,9 @@ def _need_transition(bench: ProofBench, source: str, order: Order) -> None:
     chart = bench.chart
     if (order.parameter or chart.command) != chart.command or not order.words:
         return
-    kept = optional_bits(chart, chart.command)
+    kept, last = optional_bits(chart, chart.command), unsigned(order.words[-1])
     for step in chart.transitions:
-        same = step.command is not None and not (step.command ^ order.words[-1]) & 0xFFFF & ~kept
+        same = step.command is not None and not (unsigned(step.command) ^ last) & ~kept
         if step.source == source and same and not _follows(chart, step.target) & set(bench.seen):
             seen = ", ".join(bench.seen[-3:])
             raise Unproved(f"the drive does not show {step.target}, but {seen}")

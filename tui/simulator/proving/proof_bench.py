@@ -19,6 +19,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, State
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_field, to_words, word_count
+from tui.drive.words import raw_of_word
 
 from ..drive import SimulatedDrive
 from ..spec import DriveSpec
@@ -140,7 +141,7 @@ class ProofBench:
         chosen = choose(self.chart, id, known, self.own()) if order is None else order
         target = order_target(self.profile, self.chart, chosen)
         for word in with_options(self.chart, chosen, known):
-            self.write(target, word)
+            self.write(target, raw_of_word(target, word))
         self._look()
         return chosen
 

@@ -145,9 +145,10 @@ class DriveWords:
         for _, target, word in entries:
             if target is not None:
                 self._check_value(target, word)
-        for own, target, word in entries:
+        for place, (own, target, word) in enumerate(entries):
             if target is not None:
-                self._apply(target, word)
+                after = entries[place + 1][1] if place + 1 < len(entries) else None
+                self._apply(target, word, after)
             if own != target and block is None and self._registers.owner(own):
                 self._registers.write_word(own, word)
 
@@ -211,7 +212,11 @@ class DriveWords:
         raws = {code: self._registers.present(self._profile[code]) for code in codes}
         return counts_of(self._profile, parameter, of, raws)
 
-    def _apply(self, address: int, word: int) -> None:
+    def _apply(self, address: int, word: int, after: int | None) -> None:
+        """Write a word; the drive acts on two words of one value once both are in place.
+
+        `after` is the address of the next word of the request.
+        """
         parameter = self._registers.owner(address)
         assert parameter is not None
         if not self._may_be_written(parameter):
@@ -222,7 +227,8 @@ class DriveWords:
             raw = self._within(parameter, from_words(parameter, [word]))
             word = to_words(parameter, raw, word)[0]
         self._registers.write_word(address, word)
-        self._written(parameter)
+        if after is None or self._registers.owner(after) is not parameter:
+            self._written(parameter)
 
     def _may_be_written(self, parameter: Parameter) -> bool:
         return parameter.access != "r" or parameter.code in self._taught

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from tui.drive.values import raw_range
+from tui.drive.words import type_bits, unsigned
 
 from ..schema import Chart, Order, Parameter, ProfileData, State
 from ..toml_lines import TomlPath
@@ -72,7 +73,7 @@ def _same(chart: Chart, order: Order, word: int, run: Order) -> bool:
     kept = 0
     for option in chart.options:
         kept |= option.mask if option.parameter == code else 0
-    return not (word ^ run.words[-1]) & 0xFFFF & ~kept
+    return not (unsigned(word) ^ unsigned(run.words[-1])) & ~kept
 
 
 def commands_without_effect(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
@@ -152,20 +153,37 @@ def words_that_can_be_written(data: ProfileData) -> Iterator[tuple[TomlPath, str
     """Yield commands whose parameter is never written, or does not take their words."""
     parameters = {parameter.code: parameter for parameter in data.parameters}
     for index, chart in enumerate(data.charts):
-        for place, order in enumerate(chart.orders):
-            parameter = parameters.get(order.parameter or chart.command)
-            fault = _refuses(parameter, order) if parameter is not None else ""
-            if fault:
-                yield ("charts", index, "orders", place), f"order {order.id}: {fault}"
+        at: TomlPath = ("charts", index)
+        rows = [
+            ((*at, "orders", place), f"order {order.id}", order.parameter, order.words)
+            for place, order in enumerate(chart.orders)
+        ]
+        rows += [
+            ((*at, "transitions", place), f"chart {chart.id}", "", [step.command])
+            for place, step in enumerate(chart.transitions)
+            if step.command is not None
+        ]
+        rows += [
+            ((*at, "options", place), f"option {option.id}", option.parameter, [option.mask])
+            for place, option in enumerate(chart.options)
+        ]
+        for path, name, code, words in rows:
+            parameter = parameters.get(code or chart.command)
+            if parameter is not None and (fault := _refuses(parameter, words)):
+                yield path, f"{name}: {fault}"
 
 
-def _refuses(parameter: Parameter, order: Order) -> str:
+def _refuses(parameter: Parameter, words: list[int]) -> str:
     if parameter.forbidden:
         return f"{parameter.code} is never written: {parameter.forbidden}"
     low, high = raw_range(parameter)
     reserved = sum(1 << bit for bit in set(parameter.reserved))
-    for word in order.words:
-        wire = word if low < 0 else word & 0xFFFF
+    for word in words:
+        if word > type_bits(parameter):
+            return f"{word:#x} has more bits than {parameter.code} of type {parameter.type}."
+        if word < 0 and parameter.type.endswith("32"):
+            return f"{word} is negative. Write the 32 bits of {parameter.code} in hexadecimal."
+        wire = word if low < 0 else unsigned(word)
         if not low <= wire <= high and not low <= wire - 0x10000 <= high:
             return f"{word:#06x} cannot be written to {parameter.code}: {low} to {high}."
         if wire & reserved:

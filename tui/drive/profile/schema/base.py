@@ -9,6 +9,8 @@ from msgspec import Meta, Struct
 
 WordAddress = Annotated[int, Meta(ge=0, le=0xFFFF)]
 RawWord = Annotated[int, Meta(ge=-0x8000, le=0xFFFF)]
+CommandBits = Annotated[int, Meta(ge=-0x8000, le=0xFFFFFFFF)]
+"""A command word of 16 or 32 bits; a negative one has 16."""
 ReadCount = Annotated[int, Meta(ge=1, le=125)]
 WriteCount = Annotated[int, Meta(ge=1, le=123)]
 ExceptionByte = Annotated[int, Meta(ge=1, le=255)]

@@ -7,12 +7,11 @@ from typing import Annotated, Literal
 from msgspec import Meta
 
 from .base import (
-    BitNumber,
+    CommandBits,
     Confidence,
     Identifier,
     LongBitNumber,
     LongWord,
-    RawWord,
     Table,
     When,
     WordAddress,
@@ -39,9 +38,9 @@ class Transition(Table, frozen=True, kw_only=True):
     number: str = ""
     source: Identifier
     target: Identifier
-    command: RawWord | None = None
+    command: CommandBits | None = None
     """Command word that triggers it; absent if the drive does so on its own."""
-    edge_bit: BitNumber | None = None
+    edge_bit: LongBitNumber | None = None
     name: str = ""
 
 
@@ -93,7 +92,7 @@ class Order(Table, frozen=True, kw_only=True):
 
     id: OrderId
     name: str
-    words: list[RawWord]
+    words: list[CommandBits]
     parameter: str = ""
     """Register of the words; empty: the chart's command word."""
     states: list[Identifier] = []
@@ -129,7 +128,7 @@ class Interlock(Table, frozen=True, kw_only=True):
 class OptionChoice(Table, frozen=True, kw_only=True):
     """One setting of an option: the masked bits and their name."""
 
-    bits: WordAddress
+    bits: LongWord
     name: str
 
 
@@ -139,7 +138,7 @@ class CommandOption(Table, frozen=True, kw_only=True):
     id: Identifier
     name: str
     parameter: str
-    mask: WordAddress
+    mask: LongWord
     choices: list[OptionChoice]
     stopped_only: bool = False
     note: str = ""
@@ -178,7 +177,7 @@ class Chart(Table, frozen=True, kw_only=True):
 class CommandExample(Table, frozen=True, kw_only=True):
     """A complete command word and its effect, for readers of raw words."""
 
-    word: WordAddress
+    word: LongWord
     does: str
     note: str = ""
     confidence: Confidence = "manual"
