@@ -243,7 +243,7 @@ def _state_files(chance: random.Random) -> Mapping[str, object]:
 
 def state_case(chance: random.Random, folder: Path) -> None:
     """One file of the state folder, of any content or kind: read, and rewritten."""
-    from tui.session.teaching.kept import TaughtDrive
+    from tui.session.teaching.teacher import TaughtDrive
 
     os.environ["DRIVEPANEL_STATE"] = str(folder)
     taught = TaughtDrive("tcp:x:502", 1, "powerdrive", "")
@@ -290,7 +290,7 @@ def _read_state(folder: Path, taught: Any) -> None:
     from tui.session.settings.restore import Mark
     from tui.session.starts.record import offer
     from tui.session.starts.starts import Starts
-    from tui.session.teaching.kept import keep_taught, load_taught
+    from tui.session.teaching.teacher import keep_taught, load_taught
 
     no_commands("".join(printable(line, "utf-8") for line in paths.recent_lines()))
     paths.remember_line("sim:atv71")

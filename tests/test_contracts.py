@@ -89,7 +89,7 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 def test_each_module_is_imported_or_run() -> None:
     """Commands and registrations are imported by the names that lists have."""
     from tui.cli.command_index import COMMANDS
-    from tui.screens.keys.screens import PACKAGES
+    from tui.screens.keys.table import PACKAGES
 
     by_name = {f"tui.screens.{package}.registration" for package in PACKAGES}
     by_name |= {f"tui.cli.commands.{module}" for module, *_ in COMMANDS.values()}
@@ -145,7 +145,7 @@ def test_registered_screens_do_not_import_each_other() -> None:
     import grimp
     import tomli
 
-    from tui.screens.keys.screens import PACKAGES
+    from tui.screens.keys.table import PACKAGES
 
     linter = tomli.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
     (layers,) = (c["layers"] for c in linter["contracts"] if "Layers of the screens" in c["name"])

@@ -224,7 +224,7 @@ def test_test_that_was_renamed_is_found_by_its_body() -> None:
 
 
 def test_constant_is_tested_by_functions_that_use_it() -> None:
-    path = "tui/session/proof/silences.py"
+    path = "tui/session/proof/result.py"
     lines = (ROOT / path).read_text("utf-8").splitlines()
     used = next(n for n, line in enumerate(lines, 1) if "max(LONGEST_SILENCE" in line)
     assert Uses().lines(path, ["LONGEST_SILENCE"]) == {(path, used)}

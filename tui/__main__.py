@@ -19,7 +19,7 @@ def main() -> None:
 
     keep_streams()
     if len(sys.argv) == 1 and not any(os.environ.get(name) for name in ASKING):
-        from tui.cli.alone import alone
+        from tui.cli.opening import alone
 
         alone()
         return

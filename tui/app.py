@@ -13,6 +13,7 @@ from textual.theme import Theme
 
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.keys.table import bindings
+from tui.screens.places import DriveKeys, ParameterPlaces
 from tui.session.clock import Clock
 from tui.session.connect.open_line import open_line
 from tui.session.events import EventLog
@@ -23,14 +24,12 @@ from tui.terminal.last_words import LastWords
 from tui.widgets.drawing import short
 from tui.widgets.palette import THEME
 
-from .screens.drive_keys import DriveKeys
 from .screens.key_dispatcher import KeyDispatcher
 from .screens.last_stops import LastStops
 from .screens.leaving import Leaving
 from .screens.line_check import LineCheck
 from .screens.line_owner import LineOwner, Opener
 from .screens.open_lines import LineOpening
-from .screens.parameter_places import ParameterPlaces
 from .screens.replay_keys import ReplayKeys
 from .screens.status_refresher import FRAME_LOOK, StatusRefresher
 

@@ -15,7 +15,7 @@ import pytest_asyncio
 
 from tui.bus.api import Contact, DeviceCounters, LastMinute, LineCounters
 from tui.cli.plant.metrics import BASE_UNITS, METRICS, metrics_text, value_metric
-from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
+from tui.cli.plant.publishing import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
 from tui.cli.plant.status import DriveStatus, LineReport
 from tui.drive.profile import library
 from tui.session.reading import with_text

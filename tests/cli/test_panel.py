@@ -66,7 +66,7 @@ def test_panel_opens_on_the_typed_line(
 def test_start_without_arguments_parses_nothing(
     panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("tui.cli.alone.terminal_trouble", str)
+    monkeypatch.setattr("tui.cli.opening.terminal_trouble", str)
     monkeypatch.setattr("sys.argv", ["drivepanel"])
     monkeypatch.setattr(panel, "ends_with", 1)
     with pytest.raises(SystemExit) as ended:
@@ -81,7 +81,7 @@ def test_error_without_arguments_is_reported_as_by_every_command(
     def fail(panel: FakePanel) -> None:
         raise PortBusy("/dev/ttyUSB0")
 
-    monkeypatch.setattr("tui.cli.alone.terminal_trouble", str)
+    monkeypatch.setattr("tui.cli.opening.terminal_trouble", str)
     monkeypatch.setattr("sys.argv", ["drivepanel"])
     monkeypatch.setattr(panel, "run", fail)
     with pytest.raises(SystemExit) as ended:

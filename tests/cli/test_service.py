@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from tests.programs import PATIENCE
-from tui.cli.running.service import Service
+from tui.cli.running.serving import Service
 
 UNITS = Path(__file__).resolve().parents[2] / "systemd"
 

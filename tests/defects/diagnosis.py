@@ -28,7 +28,7 @@ DEFECTS = (
     ),
     Defect(
         "other-speed-told-the-wrong-way-round",
-        "tui/session/diagnosis/garbled.py",
+        "tui/session/diagnosis/next_steps.py",
         "wanted = sight.link.baud * due / came",
         "wanted = sight.link.baud * came / due",
         "The advice leads to a baud at which the drive is received even less.",
@@ -76,7 +76,7 @@ DEFECTS = (
     ),
     Defect(
         "another-speed-for-the-same-one",
-        "tui/session/diagnosis/garbled.py",
+        "tui/session/diagnosis/next_steps.py",
         "if not came or not due or same_speed(sight) or not isinstance(sight.link, SerialLink):",
         "if not came or not due or not isinstance(sight.link, SerialLink):",
         "The advice says that the speed is right, and to open the line at another one.",

@@ -321,7 +321,7 @@ DEFECTS = (
     ),
     Defect(
         "share-of-the-current-rounded-up",
-        "tui/drive/settings/multiple.py",
+        "tui/drive/settings/limits.py",
         "counts.to_integral_value(ROUND_FLOOR)",
         'counts.to_integral_value("ROUND_CEILING")',
         "A current above the drive's limit is written, and the drive truncates it.",

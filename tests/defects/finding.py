@@ -150,7 +150,7 @@ DEFECTS = (
     ),
     Defect(
         "unclear-answer-passed-by",
-        "tui/screens/connection/other_settings.py",
+        "tui/screens/connection/screen.py",
         "if self.found or self.search.answered:",
         "if self.found:",
         "Two drives at one address get one request and are then not polled, without a question.",

@@ -66,7 +66,7 @@ DEFECTS = (
     ),
     Defect(
         "metrics-under-any-name",
-        "tui/cli/plant/metrics_server.py",
+        "tui/cli/plant/publishing.py",
         "if any(host not in names for host in _hosts(headers)):",
         "if False:",
         "A web page reads the drives of a plant through a browser in the plant's network.",

@@ -34,7 +34,7 @@ DEFECTS = (
     ),
     Defect(
         "taught-of-another-drive-used",
-        "tui/session/teaching/kept.py",
+        "tui/session/teaching/teacher.py",
         "        if self.stated:\n            others =",
         "        if not self.stated:\n            others =",
         "A replaced drive is shown in the scale of the earlier one.",
@@ -42,7 +42,7 @@ DEFECTS = (
     ),
     Defect(
         "damaged-file-written-over",
-        "tui/session/teaching/kept.py",
+        "tui/session/teaching/teacher.py",
         "        _set_aside_if_damaged(drive, path)\n",
         "",
         "All learned scales of a drive are lost because its file could not be read once.",

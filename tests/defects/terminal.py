@@ -28,7 +28,7 @@ DEFECTS = (
     ),
     Defect(
         "frames-not-waited-for",
-        "tui/terminal/pacing.py",
+        "tui/terminal/lean_app.py",
         "        if on_its_way and sum(on_its_way) > ahead and",
         "        if len(on_its_way) > 8 and sum(on_its_way) > ahead and",
         "Over a slow link the panel shows the motor's state of seconds ago.",
@@ -36,7 +36,7 @@ DEFECTS = (
     ),
     Defect(
         "what-hurries-waits-too",
-        "tui/terminal/pacing.py",
+        "tui/terminal/lean_app.py",
         "AHEAD_OF_REST if rest else AHEAD if hurry else 0",
         "AHEAD_OF_REST if rest else 0",
         "Over a slow link a stop is shown only after the frame before it.",
@@ -44,7 +44,7 @@ DEFECTS = (
     ),
     Defect(
         "lost-answer-waited-for-for-ever",
-        "tui/terminal/pacing.py",
+        "tui/terminal/lean_app.py",
         "for at, size in self._requested if now < at + self._patience]",
         "for at, size in self._requested]",
         "The panel freezes on a terminal that never answers.",
@@ -52,7 +52,7 @@ DEFECTS = (
     ),
     Defect(
         "mute-terminal-taken-for-slow",
-        "tui/terminal/pacing.py",
+        "tui/terminal/lean_app.py",
         "            not self._answers\n            and bool(self._requested)\n",
         "            False\n            and bool(self._requested)\n",
         "On a terminal that never answers, a stop is shown seconds late.",
@@ -60,7 +60,7 @@ DEFECTS = (
     ),
     Defect(
         "slow-link-never-learnt",
-        "tui/terminal/pacing.py",
+        "tui/terminal/lean_app.py",
         "self._piece = max(PIECE_LEAST, int(size * PIECE_TIME / took))",
         "self._piece = WHOLE",
         "Over a slow link every key waits for a whole frame.",
@@ -68,7 +68,7 @@ DEFECTS = (
     ),
     Defect(
         "fast-link-never-learnt",
-        "tui/terminal/pacing.py",
+        "tui/terminal/lean_app.py",
         "            self._piece = min(WHOLE, GROWTH * self._piece)\n",
         "            self._piece = PIECE_LEAST\n",
         "A fast link gets its frames in small pieces, each after an answer.",
@@ -77,8 +77,8 @@ DEFECTS = (
     Defect(
         "panel-without-its-terminal",
         "tui/terminal/driver.py",
-        "        os.kill(os.getpid(), signal.SIGHUP)\n",
-        "",
+        "    except TerminalGone:\n        os.kill(os.getpid(), signal.SIGHUP)\n",
+        "    except TerminalGone:\n",
         "A panel that lost its terminal keeps its motor running, without a person.",
         ("tests/terminal/test_driver.py::test_lost_terminal_ends_the_panel_with_a_hangup",),
     ),

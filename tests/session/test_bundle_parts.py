@@ -12,11 +12,11 @@ import pytest
 from tui.bus.api import LineState, LineStatus
 from tui.bus.fake import FakeLine
 from tui.bus.link import SerialLink
-from tui.session.bundle.archive import archive
 from tui.session.bundle.drive_parts import drive_parts
 from tui.session.bundle.parts import Missing, Part, PartFile, collect_parts, in_own_thread
 from tui.session.bundle.redaction import Names, Redaction
 from tui.session.bundle.subject import BundleSubject, DriveDocuments
+from tui.session.bundle.work import archive
 from tui.session.connect.open_line import OpenLine
 from tui.session.drive import DriveSession
 

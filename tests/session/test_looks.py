@@ -8,8 +8,7 @@ from tests.waiting import until
 from tui.drive.profile import library
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
-from tui.session.monitor.line_watch import LineWatch
-from tui.session.monitor.load import share_of_limit
+from tui.session.monitor.line_watch import LineWatch, share_of_limit
 from tui.session.monitor.monitor import Monitor
 
 

@@ -9,8 +9,7 @@ import pytest
 from tui.bus.fake import FakeLine
 from tui.drive.profile import library
 from tui.session.drive import DriveSession
-from tui.session.proof.result import ProofResult, proof_entry
-from tui.session.proof.silences import Bracket, silences
+from tui.session.proof.result import Bracket, ProofResult, proof_entry, silences
 
 PROFILE = library.load("atv312")
 RULES = PROFILE.data.communication_fault

@@ -18,7 +18,7 @@ from tui.session.clock import Clock
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.proof.prover import NothingToProve, Prover
-from tui.session.proof.silences import Bracket, silences
+from tui.session.proof.result import Bracket, silences
 from tui.session.work import Stopped
 
 from .fakes import OneDrive

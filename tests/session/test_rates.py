@@ -11,7 +11,7 @@ from tui.bus.fake import FakeLine
 from tui.drive.profile.profile import Profile
 from tui.session.drive import DriveSession
 from tui.session.monitor.alarms import FaultOnset, FaultOnsets
-from tui.session.monitor.load import share_of_limit, unread_limit
+from tui.session.monitor.line_watch import share_of_limit, unread_limit
 from tui.session.monitor.rates import Rates, bad_readings, monitoring_codes, rates_of
 from tui.session.shown import Quality
 

@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tui.cli.shared.curve_text import CURVE_ROWS, curve_text
+from tui.cli.commands.report import CURVE_ROWS, curve_text
 from tui.drive.profile import library
 from tui.session.acceptance.curve import RunCurve, RunPoint, curve_svg
 from tui.session.record.ring import files_of_line
@@ -138,7 +138,7 @@ def test_text_has_both_curves_with_their_ends(
     encoding: str, ascii: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (run,) = trends(written_run(tmp_path))
-    monkeypatch.setattr("tui.cli.shared.curve_text.output_encoding", lambda: encoding)
+    monkeypatch.setattr("tui.cli.commands.report.output_encoding", lambda: encoding)
     lines = curve_text(run)
     text = "\n".join(lines)
     assert text.isascii() is ascii

@@ -16,8 +16,7 @@ from tui.session.command.reference import Reference, parse_reference, reference_
 from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.read.reader import Reader
-from tui.session.teaching.kept import TaughtDrive
-from tui.session.teaching.teacher import Teacher
+from tui.session.teaching.teacher import TaughtDrive, Teacher
 
 from .fakes import OneDrive, parameter, profile_of
 

@@ -7,9 +7,9 @@ import struct
 import pytest
 
 from tui.simulator import DriveSpec, LineTiming, SimulatedDrive, SimulatorError
+from tui.simulator.server.answering import in_group
 from tui.simulator.server.frames import seal
 from tui.simulator.server.line import SimulatedLine
-from tui.simulator.server.station import in_group
 
 from .small import PROFILES
 

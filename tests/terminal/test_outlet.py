@@ -10,7 +10,7 @@ from typing import IO, cast
 import pytest
 from textual.drivers._writer_thread import WriterThread
 
-from tui.terminal.outlet import Outlet
+from tui.terminal.driver import Outlet
 
 
 class LostTerminal:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from tui.terminal.pacing import AHEAD, LOST_AFTER, MUTE_AFTER, WHOLE, Pacing
+from tui.terminal.lean_app import AHEAD, LOST_AFTER, MUTE_AFTER, WHOLE, Pacing
 
 
 @dataclass

@@ -19,8 +19,8 @@ from tui.cli.shared.diagnosis_documents import drive_documents
 from tui.screens.bundle import CANCELLED, NO_LINE_CHOSEN, BundleScreen
 from tui.screens.choosing import Palette
 from tui.screens.dialogs.ask import Ask
-from tui.session.bundle.archive import Bundle
 from tui.session.bundle.parts import PartProgress
+from tui.session.bundle.work import Bundle
 from tui.session.connect.open_line import open_line
 from tui.session.events import EventLog
 

@@ -23,8 +23,7 @@ from textual.strip import Strip
 from textual.widgets import Label
 
 from tui.terminal.lean import Picture, blank_style, strips_of
-from tui.terminal.lean_app import LeanApp
-from tui.terminal.pacing import ASK, WHOLE
+from tui.terminal.lean_app import ASK, WHOLE, LeanApp
 from tui.widgets.lines import Lines, looks, piece_by_piece, runs
 
 from .bytes_per_second import compare

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from tui.bus.line import Frame
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
-from tui.screens.frames.decoded import decoded
+from tui.screens.frames.choice import decoded
 from tui.wire.frames import sealed
 
 ATV71 = library.load("atv71")

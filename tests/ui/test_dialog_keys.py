@@ -42,8 +42,8 @@ from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
 from tui.screens.parameters.set_keys import Skipped
 from tui.screens.parameters.write_keys import RestQuestion, Results
 from tui.screens.why import WhyScreen
-from tui.session.bundle.archive import Bundle
 from tui.session.bundle.parts import PartProgress
+from tui.session.bundle.work import Bundle
 from tui.session.connect.addresses import parse_addresses
 from tui.session.console import DriveConsole
 from tui.session.diagnosis.diagnosis import Diagnosis

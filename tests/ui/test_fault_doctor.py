@@ -11,8 +11,7 @@ from tests.ui.fakes import NOW, readings_of
 from tui.drive.hints import reset_text
 from tui.drive.profile import library
 from tui.drive.sentences import capitalized
-from tui.screens.faults.cause_rows import EXCLUDED, LIKELIEST, OPEN
-from tui.screens.faults.doctor import TOO_FEW, doctor_lines
+from tui.screens.faults.doctor import EXCLUDED, LIKELIEST, OPEN, TOO_FEW, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
 from tui.screens.faults.history import history_rows
 from tui.screens.faults.next_steps import ARM, BESIDE_KEY

@@ -27,8 +27,7 @@ from tui.screens.frames.heard import ListeningScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.action import OPENING
 from tui.screens.keys.help import HelpScreen
-from tui.screens.keys.screens import EVERYWHERE
-from tui.screens.keys.table import ACTIONS
+from tui.screens.keys.table import ACTIONS, EVERYWHERE
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.opening import OpeningScreen

@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 
 from tui.bus.api import Frame
 from tui.drive.profile import library
-from tui.screens.frames.choice import FrameChoice, choice_of, chosen
-from tui.screens.frames.decoded import decoded
+from tui.screens.frames.choice import FrameChoice, choice_of, chosen, decoded
 from tui.screens.frames.frame_view import frame_time, frames_text, gap_text, gaps
 from tui.wire.frames import sealed
 

@@ -21,9 +21,8 @@ from tui.screens.hear import why_not_hear
 from tui.session.connect import address_prober
 from tui.session.connect.identify import DriveIdentity
 from tui.session.fleet import Fleet, FoundDrive
-from tui.session.listening.background import BackgroundListener
+from tui.session.listening.background import BackgroundListener, PortListener
 from tui.session.listening.families import Families
-from tui.session.listening.port_listener import PortListener
 from tui.session.listening.summary import ListeningSummary
 from tui.simulator import DriveSpec, Simulation
 from tui.wire.frames import frame, read_frame

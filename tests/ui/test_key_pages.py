@@ -14,8 +14,7 @@ from textual.screen import Screen
 from tui.app import DrivePanelApp
 from tui.screens.keys.action import KEY_NAMES
 from tui.screens.keys.pages import EVERY_SCREEN, TABLE, key_table, with_tables, write_pages
-from tui.screens.keys.screens import EVERYWHERE, SCREENS
-from tui.screens.keys.table import ACTIONS, bindings
+from tui.screens.keys.table import ACTIONS, EVERYWHERE, SCREENS, bindings
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGES = sorted((ROOT / "docs" / "screens").glob("*.md"))

@@ -26,8 +26,7 @@ from tui.screens.command.control import Control
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.keys.action import CONNECTION, KEY_NAMES, LISTENING, OPENING, Action
-from tui.screens.keys.screens import EVERYWHERE, TABBED
-from tui.screens.keys.table import ACTIONS, elsewhere, key_meanings, keys_line
+from tui.screens.keys.table import ACTIONS, EVERYWHERE, TABBED, elsewhere, key_meanings, keys_line
 from tui.screens.monitor.screen import order_keys
 from tui.screens.open_lines import LineOpening
 from tui.screens.parameters.screen import ParametersScreen

@@ -24,22 +24,21 @@ from tui.screens.dialogs.pick_parameter import (
     WIDEST,
     pick_lines,
 )
-from tui.screens.faults.doctor import doctor_lines
-from tui.screens.faults.doctor_view import DoctorView
-from tui.screens.faults.parts import LABEL
-from tui.screens.faults.value_rows import (
+from tui.screens.faults.doctor import (
     CODE_WIDTH,
     LEAST_NOW,
     LEAST_TRIP,
     WIDEST_ROW,
+    doctor_lines,
     value_rows,
 )
+from tui.screens.faults.doctor_view import DoctorView
+from tui.screens.faults.parts import LABEL
 from tui.screens.faults.view import stored_lines
 from tui.screens.keys.finding import find
-from tui.screens.keys.screens import SCREENS
-from tui.screens.monitor.motor import other_values, value_labels
-from tui.screens.parameters.group_view import group_lines
-from tui.screens.parameters.parameter_list import FIRST, LAST, ParameterList
+from tui.screens.keys.table import SCREENS
+from tui.screens.monitor.assembly import other_values, value_labels
+from tui.screens.parameters.parameter_list import FIRST, LAST, ParameterList, group_lines
 from tui.screens.parameters.screen import NARROW, WIDE
 from tui.screens.parameters.table_view import head_line, items_of, layout_of, row_line
 from tui.session.settings.editor import Editor

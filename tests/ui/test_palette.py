@@ -17,8 +17,7 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.finding import BY_NAME, MOVES, NOT_FOUND, find
-from tui.screens.keys.screens import EVERYWHERE
-from tui.screens.keys.table import ACTIONS
+from tui.screens.keys.table import ACTIONS, EVERYWHERE
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
 

@@ -16,11 +16,16 @@ from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.frames.frame_view import frame_line
 from tui.screens.keys.action import CONNECTION, MONITOR
-from tui.screens.keys.screens import EVERYWHERE
-from tui.screens.keys.table import keys_line, screen_actions
+from tui.screens.keys.table import EVERYWHERE, keys_line, screen_actions
 from tui.screens.monitor.arrange import OUTSIDE, WIDE, Arrangement, arrange
-from tui.screens.monitor.assembly import codes_beside, monitor_parts, watched_words
-from tui.screens.monitor.motor import motor_lines, other_values, value_cells
+from tui.screens.monitor.assembly import (
+    codes_beside,
+    monitor_parts,
+    motor_lines,
+    other_values,
+    value_cells,
+    watched_words,
+)
 from tui.screens.monitor.readouts import readout_lines
 from tui.screens.monitor.screen import order_keys
 from tui.screens.monitor.view import View

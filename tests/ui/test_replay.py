@@ -13,7 +13,7 @@ from tests.session.test_replay import BEGIN, event, record, row
 from tui.app import DrivePanelApp
 from tui.drive.profile import library
 from tui.screens.dialogs.ask import Ask
-from tui.screens.keys.screens import TABBED
+from tui.screens.keys.table import TABBED
 from tui.session.connect.open_line import OpenLine, demo_line, open_line
 from tui.session.journal import Journal
 from tui.widgets.lines import Lines

@@ -18,7 +18,7 @@ from tui.drive.profile import library
 from tui.screens.frame import TABS, message_lines
 from tui.screens.frame_source import FrameSource
 from tui.screens.keys.action import MONITOR
-from tui.screens.keys.screens import TABBED
+from tui.screens.keys.table import TABBED
 from tui.session.command.commander import STILL_IN_FAULT
 from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK

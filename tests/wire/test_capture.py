@@ -11,8 +11,15 @@ from pathlib import Path
 import pytest
 
 from tests.programs import PATIENCE
-from tui.wire.capture.forms import READ_RAW, ModbusTcpForm, PacketForm, RtuForm
-from tui.wire.capture.pcapng import interface_block, packet_block, section_block
+from tui.wire.capture.forms import (
+    READ_RAW,
+    ModbusTcpForm,
+    PacketForm,
+    RtuForm,
+    interface_block,
+    packet_block,
+    section_block,
+)
 
 LINE = "serial:/dev/ttyUSB0,19200,8E1"
 WALL = 1_767_225_600.25

@@ -1,4 +1,4 @@
-"""Opening the panel itself; what takes a command line apart is not needed here."""
+"""Opening the panel itself; what parses a command line is not needed here."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import sys
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from tui.session.logs import start_logging
 from tui.session.signals import BY_SIGNAL
 
 from .shared.signals import ending_by_signal, never_suspended
@@ -15,6 +16,35 @@ from .shared.signals import ending_by_signal, never_suspended
 if TYPE_CHECKING:
     from tui.session.bundle.subject import DriveDocuments
     from tui.session.connect.open_line import OpenLine
+
+
+def alone() -> None:
+    """Open the panel; every failure is reported as by other commands."""
+    gc.disable()  # until the first picture
+    try:
+        start_logging(0)
+        if not terminal_trouble():
+            sys.exit(open_panel(None, None))
+    except (Exception, KeyboardInterrupt) as error:
+        _tell(error)
+    from .main import main
+
+    main(prog_name="drivepanel")
+
+
+def _tell(error: BaseException) -> None:
+    """Report an error and end with its status."""
+    import click
+
+    from .shared.errors import reported
+
+    @click.command()
+    @reported
+    def failed() -> None:
+        raise error
+
+    failed(args=[], prog_name="drivepanel")
+
 
 STOP, LEAVE_RUNNING = "stop", "leave-running"
 

@@ -27,8 +27,7 @@ from tui.widgets.replay_bar import replay_line, time_line
 from tui.widgets.small import is_too_small, small_lines
 from tui.widgets.strip import BarMessage, FrameView, Tab, message_line, strip_line, tabs_line
 
-from .keys.screens import SCREENS, TABBED
-from .keys.table import once_closed, stop_keys
+from .keys.table import SCREENS, TABBED, once_closed, stop_keys
 
 if TYPE_CHECKING:
     from tui.session.events import Event

@@ -6,19 +6,26 @@ import logging
 from typing import TYPE_CHECKING
 
 from .app_port import Panel
-from .keys.action import (
-    CONNECTION,
-    MONITOR,
-    WIRING,
-)
-from .keys.screens import SCREENS
+from .keys.action import CONNECTION, MESSAGES, MONITOR, PARAMETERS, WIRING
+from .keys.table import SCREENS
 
 if TYPE_CHECKING:
     from textual.widget import AwaitMount
 
     from tui.session.console import DriveConsole
+    from tui.session.fleet import FoundDrive
 
 log = logging.getLogger(__name__)
+
+OPEN_NOW = "Drive {drive} is open: Space stops it."
+SHOWN_NOW = "Drive {drive} of the replay is shown."
+
+
+def _named(drive: FoundDrive) -> str:
+    """Return the address of a drive with its name, or with its model."""
+    identity, session = drive.identity, drive.session
+    name = identity.name or identity.reference or (session.profile.name if session else "")
+    return f"{identity.device} {name}".rstrip()
 
 
 class Places(Panel):
@@ -147,3 +154,102 @@ class Places(Panel):
             work()
         elif otherwise:
             self.tell(otherwise)
+
+
+class DriveKeys(Places):
+    """The next or previous drive of the line, or the one at a typed address."""
+
+    def action_step_drive(self, step: int) -> None:
+        """Show the same screen for the next or previous drive found on the line."""
+        consoles = self.fleet.consoles if self.fleet else []
+        if self.chosen not in consoles:
+            self.tell("No drive is open. Select a drive on Line and press Enter.")
+            return
+        if len(consoles) < 2:
+            self.tell("Only one drive was found on the line.")
+            return
+        self._show_same_place(consoles[(consoles.index(self.chosen) + step) % len(consoles)])
+
+    def _show_same_place(self, wanted: DriveConsole) -> None:
+        """Show the present screen for another drive, which the stop key now stops."""
+        place = self.place
+        if place == CONNECTION:
+            self._choose(wanted)
+            self._ask_screen("draw_stop_keys")
+            return
+        self.show_monitor(wanted)
+        if place not in (MONITOR, MESSAGES):
+            self.show_place(place, wanted)
+
+    def action_type_address(self) -> None:
+        """Ask for the address of a drive on the line, and show the same screen for it."""
+        from .dialogs.address import AddressField
+
+        fleet = self.fleet
+        if fleet is None or not fleet.found:
+            self.tell("No drive was found. Press s on Line to scan.")
+            return
+        below = self.screen
+
+        def typed(address: int | None) -> None:
+            console = None if address is None else fleet.console(address)
+            # a stop, or another line, may have changed the screen in the meantime
+            if console is None or self.fleet is not fleet or self.screen is not below:
+                return
+            self._show_same_place(console)
+            text = OPEN_NOW if self.replay is None else SHOWN_NOW
+            self.tell(text.format(drive=_named(fleet.found[console.device])))
+
+        named = {
+            device: None if drive.console is None else _named(drive)
+            for device, drive in fleet.found.items()
+        }
+        self.push_screen(AddressField(named), typed)
+
+
+class ParameterPlaces(Places):
+    """Keys that show Parameters on the open drive, and then act there."""
+
+    async def action_find(self) -> None:
+        """Go to the parameter search; what is typed next is searched for."""
+        await self._ask_parameters("action_search")
+
+    async def open_parameter(self, code: str, proposed: int | None = None) -> None:
+        """Show a parameter of the open drive in the editor, under the cursor.
+
+        With a `proposed` raw value, its dialog opens with this value, which is not staged.
+        """
+        from textual.widgets import Input
+
+        from .parameters.stage_keys import StageKeys
+
+        if shown := self.action_goto(PARAMETERS):
+            await shown
+        self.screen.query_one("#search", Input).value = code
+        self.screen.set_focus(None)
+        if proposed is not None and isinstance(self.screen, StageKeys):
+            # in the new screen: the one on which Enter was pressed gets no answer once it is closed
+            self.screen.call_later(self.screen.edit, code, proposed)
+
+    async def action_eeprom(self) -> None:
+        """Save the settings of the open drive to its EEPROM."""
+        await self._ask_parameters("action_save_eeprom")
+
+    async def action_back_up(self) -> None:
+        """Save the settings of the open drive under a new name."""
+        await self._ask_parameters("action_back_up_now")
+
+    async def action_differ(self) -> None:
+        """Compare the open drive with its newest backup."""
+        await self._ask_parameters("action_compare_newest")
+
+    async def action_report(self) -> None:
+        """Write a report on the open drive to a file."""
+        await self._ask_parameters("action_report")
+
+    async def _ask_parameters(self, action: str) -> None:
+        """Go to Parameters, and call this method of it."""
+        if shown := self.action_goto(PARAMETERS):
+            await shown
+        if self.chosen is not None:
+            self._ask_screen(action)

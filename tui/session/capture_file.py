@@ -8,8 +8,15 @@ from pathlib import Path
 
 import tui
 from tui.bus.api import Frame
-from tui.wire.capture.forms import ModbusTcpForm, Packet, PacketForm, RtuForm
-from tui.wire.capture.pcapng import interface_block, packet_block, section_block
+from tui.wire.capture.forms import (
+    ModbusTcpForm,
+    Packet,
+    PacketForm,
+    RtuForm,
+    interface_block,
+    packet_block,
+    section_block,
+)
 from tui.wire.frames import MBAP_BYTES, is_whole, pdu_of
 
 

@@ -6,7 +6,7 @@ from .drive import SimulatedDrive
 from .errors import SimulatorError
 from .plc import PlcOnLine, plc_cycle
 from .server.client_settings import ClientSettings
-from .server.stream import ByteStream
+from .server.endpoints import ByteStream
 from .simulation import Simulation
 from .spec import DriveSpec, LineTiming, parse_drives
 from .troubles import TROUBLES, FaultRates, Habits, troubles_of

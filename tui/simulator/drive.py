@@ -27,9 +27,8 @@ from .plant.watch import SilenceWatch
 from .registers import Registers, typed_raw
 from .rules import traits_of
 from .server.access import DriveWords
-from .server.answering import Answering
+from .server.answering import Answering, Station
 from .server.functions import Server, identity_of
-from .server.station import Station
 from .spec import DriveSpec, LineTiming
 from .tripping import Tripping
 

@@ -16,10 +16,9 @@ from .errors import SimulatorError
 from .ghost import GhostDrive
 from .server.client_settings import ClientSettings
 from .server.conversation import Conversation, RtuConversation, TcpConversation
-from .server.endpoints import Endpoint, PtyEndpoint, TcpEndpoint
+from .server.endpoints import ByteStream, Endpoint, PtyEndpoint, StreamEndpoint, TcpEndpoint
 from .server.faults import FaultPlan
 from .server.line import SimulatedLine
-from .server.stream import ByteStream, StreamEndpoint
 from .spec import DriveSpec, LineTiming
 from .troubles import FaultRates, Habits
 

@@ -16,7 +16,7 @@ import threading
 import time
 from contextlib import suppress
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import IO, TYPE_CHECKING, Any, Protocol, cast
 
 from textual import constants, events
 from textual._xterm_parser import XTermParser
@@ -24,7 +24,6 @@ from textual.driver import Driver
 from textual.message import Message
 
 from .loop import soon_in_loop
-from .outlet import Outlet
 from .reader import KeyReader, Stops, TerminalInput
 from .stroke import Pressed, attach
 from .tokens import Report
@@ -32,6 +31,50 @@ from .tokens import Report
 if TYPE_CHECKING:
     from collections.abc import Iterator
     from selectors import BaseSelector
+
+
+log = logging.getLogger(__name__)
+
+
+class Outlet:
+    """The file of a terminal that discards all output after the terminal has disappeared.
+
+    Textual writes to it in a thread. An error there would end the thread, and the panel would then
+    wait for it forever: no motor would be stopped.
+    """
+
+    def __init__(self, file: IO[str]) -> None:
+        self._file = file
+        self._lost = False
+
+    def write(self, text: str) -> None:
+        """Write text; send the panel SIGHUP if the terminal has disappeared."""
+        if not self._lost:
+            try:
+                self._file.write(text)
+            except OSError as error:
+                self._lose(error)
+
+    def flush(self) -> None:
+        """Flush what was written."""
+        if not self._lost:
+            try:
+                self._file.flush()
+            except OSError as error:
+                self._lose(error)
+
+    def fileno(self) -> int:
+        """The file's descriptor."""
+        return self._file.fileno()
+
+    def isatty(self) -> bool:
+        """True if it is a terminal."""
+        return self._file.isatty()
+
+    def _lose(self, error: OSError) -> None:
+        log.error("the terminal no longer accepts output: %s", error)
+        self._lost = True
+        os.kill(os.getpid(), signal.SIGHUP)
 
 
 def with_held_input(driver: type[Driver]) -> type[Driver]:
@@ -82,8 +125,6 @@ def with_held_input(driver: type[Driver]) -> type[Driver]:
 
     return HoldingDriver
 
-
-log = logging.getLogger(__name__)
 
 END_POLL_INTERVAL = 0.1
 """Seconds between two checks if the panel must end."""

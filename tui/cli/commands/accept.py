@@ -38,7 +38,7 @@ from ..shared.say import say
 from ..shared.sets import write_down
 
 if TYPE_CHECKING:
-    from tui.session.acceptance.high_speed import HighSpeed
+    from tui.session.acceptance.plan import HighSpeed
     from tui.session.acceptance.result import AcceptanceResult
     from tui.session.acceptance.step_file import AcceptanceFile
     from tui.session.connect.open_line import OpenLine

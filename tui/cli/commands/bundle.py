@@ -29,9 +29,9 @@ if TYPE_CHECKING:
     from tui.bus.errors import LineError
     from tui.bus.link import Link
     from tui.drive.profile.profile import Profile
-    from tui.session.bundle.archive import Bundle
     from tui.session.bundle.parts import PartProgress
     from tui.session.bundle.subject import BundleSubject
+    from tui.session.bundle.work import Bundle
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 

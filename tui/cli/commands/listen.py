@@ -13,9 +13,9 @@ import click
 
 from tui.bus.listening_line import ListeningLine
 from tui.session.capture_file import CaptureFile
+from tui.session.listening.background import PortListener
 from tui.session.listening.families import Families
 from tui.session.listening.listener import DecodedExchange
-from tui.session.listening.port_listener import PortListener
 from tui.session.signals import BY_SIGNAL, signal_name
 from tui.wire.observed.splitting import ObservedFrame
 
@@ -31,7 +31,7 @@ from ..shared.signals import interrupted_by_signal, never_suspended
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
-    from tui.session.listening.place import PlaceToListen
+    from tui.session.listening.background import PlaceToListen
 
 PROGRAM_NAME = "listen"
 LAST_ADDRESS_HEARD = 255
@@ -96,8 +96,8 @@ def listen(
     named = profiles_named(profile_ids)
     from tui.bus.errors import LineError
     from tui.session.connect.address_prober import known_profiles
+    from tui.session.listening.background import line_to_listen
     from tui.session.listening.families import Families, remembered_families
-    from tui.session.listening.place import line_to_listen
 
     from ..shared.listen_outputs import ListenJsonOutput, ListenTextOutput
 
@@ -136,7 +136,7 @@ def _serial_line(
     opening: AbstractContextManager[PlaceToListen],
 ) -> Iterator[PlaceToListen]:
     """The line that is meant; raises UsageError if it is not a serial line."""
-    from tui.session.listening.place import CannotListen
+    from tui.session.listening.background import CannotListen
 
     with ExitStack() as stack:
         try:

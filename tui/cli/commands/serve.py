@@ -22,8 +22,7 @@ from ..plant.publish_options import (
     publish_options,
     read_drives,
 )
-from ..running.service import Service
-from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
+from ..running.serving import GatewayWish, OpenedLine, ServedAt, Service, served_until_signal
 from ..shared.completion import complete_line
 from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line

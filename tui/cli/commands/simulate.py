@@ -12,6 +12,7 @@ import click
 
 from tui.session.signals import handled
 
+from ..documents.other_documents import BehaviorField, SimulatedBehaviorDocument
 from ..shared.completion import complete_profile
 from ..shared.host_port import host_port, written_host_port
 from ..shared.numbers import FiniteRange
@@ -24,6 +25,26 @@ from ..shared.signals import never_suspended
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, Simulation
     from tui.simulator.ghost import GhostDrive
+
+
+def show_about(name: str, as_json: bool) -> None:
+    """Print how a simulated drive of a profile behaves, and where that is from."""
+    from tui.drive.profile.library import load
+    from tui.simulator.about import behaviors_of
+
+    profile = load(name.casefold())
+    found = behaviors_of(profile)
+    if as_json:
+        behaviors = [
+            BehaviorField(text=item.text, provenance=item.provenance, source=item.source)
+            for item in found
+        ]
+        print_json(SimulatedBehaviorDocument(profile=profile.id, behaviors=behaviors))
+        return
+    say(f"Simulated {profile.name}: printed in its manual, public elsewhere, or a guess.")
+    for item in found:
+        say(f"{item.provenance:<8} {item.text} ({item.source})", indent=9)
+
 
 USUAL = (19200, "8E1")
 """Baud and format of a LINE that names none."""
@@ -143,8 +164,6 @@ def simulate(
     "in 3.5s: 2: jam". "2:" shows its inputs, "2: state" its real state.
     """
     if about is not None:
-        from ..running.bench_about import show_about
-
         show_about(about, as_json)
         return
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:

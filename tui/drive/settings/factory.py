@@ -12,7 +12,7 @@ from ..profile.profile import UNVERIFIED, Profile
 from ..profile.schema import Parameter
 from ..shown import shown
 from ..values import Value
-from .multiple import counts_of
+from .limits import counts_of
 from .writable import is_setting
 
 

@@ -11,8 +11,7 @@ from ..profile.schema import Parameter
 from ..shown import number_of
 from ..values import engineering, is_enumeration, raw_range
 from .edits import Edits
-from .limits import edit_problems, limit_pairs, limits_are_sure
-from .multiple import value_of
+from .limits import edit_problems, limit_pairs, limits_are_sure, value_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -227,7 +227,7 @@ def _ahead(console: DriveConsole, seen: Seen) -> str:
 
 
 def _share(console: DriveConsole, readings: Mapping[str, Shown]) -> float | None:
-    from tui.session.monitor.load import share_of_limit  # imported late: speeds up the start
+    from tui.session.monitor.line_watch import share_of_limit  # imported late: speeds up the start
 
     parameter = console.session.profile.quantity("motor_current")
     return share_of_limit(console.session, readings.get(parameter.code) if parameter else None)

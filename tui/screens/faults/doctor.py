@@ -4,27 +4,183 @@ from __future__ import annotations
 
 import time
 
+from rich.style import Style
 from rich.text import Text
 
+from tui.drive.causes import WeighedCause
+from tui.drive.hints import TRUST
 from tui.drive.plain import plain
-from tui.widgets.drawing import cut_at_word
-from tui.widgets.palette import ALARM_BLOCK, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
-
-from .cause_rows import cause_rows
-from .doctor_view import DoctorView
-from .history import history_rows, shown_count
-from .next_steps import (
-    check_rows,
-    next_heading,
-    open_row,
-    record_row,
-    reset_rows,
-    written_row,
+from tui.drive.profile.profile import is_verified
+from tui.drive.profile.schema import FaultHelp
+from tui.session.monitor.fault_record import TRIP_NEAR
+from tui.session.shown import Shown
+from tui.widgets.drawing import cut, cut_at_word, fitted_names, rule, wrapped
+from tui.widgets.palette import (
+    ALARM,
+    ALARM_BLOCK,
+    CURSOR,
+    FAINT,
+    FAULT,
+    FAULT_BLOCK,
+    LINE,
+    PLAIN,
+    STALE,
+    STRONG,
+    TITLE,
 )
-from .parts import ago_text
+
+from .doctor_view import DoctorView, ValueRow
+from .history import history_rows, shown_count
+from .next_steps import check_rows, next_heading, open_row, record_row, reset_rows, written_row
+from .parts import ago_text, reading_text
 from .quiet import quiet_rows
 from .trip_curve import LEAST_ROWS, trip_curve_lines, trip_curve_width
-from .value_rows import value_rows
+from .view import stored_text
+
+CODE_WIDTH = 7
+TRIP, NOW = "at the trip", "now"
+"""Headings of the columns."""
+WIDEST_ROW = 90
+"""Columns of a row, so that values stay close to their names."""
+LEAST_TRIP, LEAST_NOW, MOST = 14, 10, 22
+"""Columns of a value."""
+BEFORE = "~"
+"""Mark of a value that was read before the trip, if the drive has stored none."""
+
+
+def value_rows(view: DoctorView, width: int) -> list[Text]:
+    """Return the heading and a row for each parameter."""
+    rows, width = view.rows, min(width, WIDEST_ROW)
+    if not rows:
+        return []
+    trips = [_trip_text(view, row) for row in rows]
+    nows = [reading_text(view.value_now(row), view.now) for row in rows]
+    trip_width = _column([text for text, _ in trips], LEAST_TRIP)
+    now_width = _column([text for text, _ in nows], LEAST_NOW)
+    room = max(4, width - 4 - CODE_WIDTH - trip_width - now_width)
+    names = fitted_names(tuple(dict.fromkeys(row.why for row in rows)), room)
+    lines = [_heading(width, now_width)]
+    for number, row in enumerate(rows):
+        chosen = number == view.at
+        text = Text("  ", no_wrap=True)
+        unsure = "" if is_verified(view.profile[row.code]) else "?"
+        text.append(row.code, STRONG)
+        text.append(f"{unsure:<{max(1, CODE_WIDTH - len(row.code))}}", STALE)
+        text.append(f"{names[row.why]:<{room}}", PLAIN if chosen else FAINT)
+        for (value, style), cells in ((trips[number], trip_width), (nows[number], now_width)):
+            text.append(f"{cut(value, cells - 1).rstrip():>{cells}}", style)
+        text.pad_right(width - text.cell_len)
+        if chosen:
+            text.stylize(CURSOR)
+        lines.append(text)
+    return lines
+
+
+def _column(texts: list[str], least: int) -> int:
+    return max(least, min(MOST, max(map(len, texts), default=0) + 1))
+
+
+def _heading(width: int, now: int) -> Text:
+    """Return the title on its line, with the names of the columns over their values."""
+    text = Text(no_wrap=True)
+    text.append("Values ", TITLE)
+    text.append("─" * max(0, width - 11 - len(TRIP) - now), LINE)
+    text.append(f" {TRIP} ", TITLE)
+    text.append("─" * max(0, now - len(NOW) - 2), LINE)
+    text.append(f" {NOW}", TITLE)
+    text.append(" ──", LINE)
+    return text
+
+
+def _trip_text(view: DoctorView, row: ValueRow) -> tuple[str, Style]:
+    """Return the value at the trip: what the drive keeps, else the last one before it."""
+    stored = view.value_stored(row)
+    if stored is not None and stored.raw is not None:
+        return stored_text(stored), PLAIN
+    before = view.value_before(row)
+    if before is None or before.raw is None or view.record is None:
+        return "", FAINT
+    return _before_text(before, max(r.time for r in view.record.before.values()))
+
+
+def _before_text(reading: Shown, last: float) -> tuple[str, Style]:
+    text = f"{BEFORE}{reading_text(reading, last)[0]}"
+    age = reading.age(last)
+    return (text, PLAIN) if age <= TRIP_NEAR else (f"{text} -{age:.0f}s", STALE)
+
+
+SIGN_WIDTH = 4
+"""Columns of the sign before a cause."""
+LIKELIEST, OPEN, EXCLUDED = "▸", "?", "×"
+"""Sign of a cause: the likeliest or supported by a value, not decided, and ruled out."""
+STRUCK = Style(color=FAINT.color, strike=True)
+
+
+def cause_rows(view: DoctorView, width: int) -> list[list[Text]]:
+    """Return the rows of each cause, the likeliest first, under the heading."""
+    left = view.advice
+    if view.hint is None or left is None:
+        return _unweighed(view, width)
+    count = len(left.probable)
+    reported = f"{count} of {len(left.causes)} left, {TRUST[left.confidence]}"
+    heading = [rule("Why", width, reported)]
+    if isinstance(view.hint, FaultHelp) and view.hint.name:
+        heading.append(Text(cut(f"  {view.hint.name}", width), PLAIN))
+    if not count:
+        heading.append(Text(cut("  No cause is left: the values rule out each one.", width), ALARM))
+    aligned = SIGN_WIDTH + 2 + max(len(cause.text) for cause in left.causes)
+    rows = [_rows(cause, not n, aligned, width) for n, cause in enumerate(left.causes)]
+    return [heading, *rows]
+
+
+def _unweighed(view: DoctorView, width: int) -> list[list[Text]]:
+    """Return the cause that the profile names, if there is no help on the fault."""
+    if view.is_quiet:
+        return []
+    cause = view.fault.cause if view.fault else ""
+    cause = cause or view.profile.guide.trouble or "The available manual gives no cause."
+    rows = [Text(f"    {part}", PLAIN) for part in wrapped(cause, width - SIGN_WIDTH - 1, 3)]
+    return [[rule("Why", width)], rows]
+
+
+def _rows(cause: WeighedCause, first: bool, aligned: int, width: int) -> list[Text]:
+    """Return a cause, and its values beside it or, if there is no room, below it."""
+    excluded = cause.verdict == "excluded"
+    likely = cause.verdict == "supported" or (first and not excluded)
+    sign = EXCLUDED if excluded else LIKELIEST if likely else OPEN
+    text = Text("  ", no_wrap=True)
+    text.append(f"{sign} ", FAINT if excluded else STRONG if likely else ALARM)
+    style = STRUCK if excluded else STRONG if first else PLAIN
+    text.append(cut(cause.text, min(len(cause.text), width - SIGN_WIDTH)).rstrip(), style)
+    aligned = min(aligned, width // 2 + SIGN_WIDTH)
+    reason = reason_text(cause)
+    if max(aligned, text.cell_len + 2) + len(reason) > width:
+        reason = reason_text(cause, 1)
+    column = max(aligned, text.cell_len + 2)
+    if column + len(reason) > width:
+        column = text.cell_len + 2
+    if column + len(reason) <= width:
+        text.append(" " * (column - text.cell_len))
+        text.append(reason, PLAIN if cause.verdict == "supported" else FAINT)
+        return [text]
+    if cause.verdict == "open":
+        return [text]
+    parts = wrapped(reason, width - SIGN_WIDTH - 2, 2)
+    below = [Text(f"{' ' * (SIGN_WIDTH + 2)}{part}", PLAIN, no_wrap=True) for part in parts]
+    return [text, *below]
+
+
+def reason_text(cause: WeighedCause, most: int = 2) -> str:
+    """Return the values that decided about a cause, `most` of them, or why none did."""
+    if cause.verdict == "open":
+        unknown = ", ".join(cause.unknown[:2])
+        return f"not known: {unknown}" if unknown else "no value decides"
+    texts = [evidence.text for evidence in cause.evidence[:most]]
+    text = "; ".join(texts)
+    if cause.evidence[0].basis == "now" and cause.verdict == "excluded":
+        return f"not now: {text}"
+    return f"now {text}" if cause.evidence[0].basis == "now" else text
+
 
 TIME = "%H:%M:%S"
 FEW_ROWS = 12

@@ -20,8 +20,7 @@ from tui.widgets.lines import Lines
 from tui.widgets.plain import Plain
 
 from ..base import PanelScreen
-from .choice import choice_of, chosen
-from .decoded import decoded
+from .choice import choice_of, chosen, decoded
 from .frame_view import BESIDE_BYTES, frame_line, frames_text, gaps
 from .saving import KeptFrames, ask_where
 

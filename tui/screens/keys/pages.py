@@ -13,8 +13,7 @@ from pathlib import Path
 from tui.drive.small_file import read_small_text
 
 from .action import KEY_NAMES, Action
-from .screens import SCREENS
-from .table import APP_ACTIONS, STOP_ACTIONS
+from .table import APP_ACTIONS, SCREENS, STOP_ACTIONS
 
 EVERY_SCREEN = "every screen"
 """Heading of the app's own actions in a page."""

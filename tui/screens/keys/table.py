@@ -1,4 +1,4 @@
-"""Every action of the panel: those of each registered screen, and those that all screens have.
+"""The list of screens, and every action: those of each screen, and those that all screens have.
 
 Bindings, the key bar, the help screen and the palette are made from this table.
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cache, partial
+from importlib import import_module
 
 from textual.binding import Binding, BindingType
 
@@ -14,8 +15,36 @@ from tui.terminal.names import UNSHIFTED_DIGITS
 from tui.widgets.drawing import KeyLabel, fitting
 from tui.widgets.replay_bar import NO_MOTOR
 
-from .action import START_UP, Action
-from .screens import EVERYWHERE, SCREENS, TABBED
+from .action import START_UP, Action, Registration
+
+PACKAGES = (
+    "connection",
+    "monitor",
+    "parameters",
+    "blocks",
+    "faults",
+    "control",
+    "frames",
+    "trend",
+    "messages",
+    "startup",
+    "wiring",
+)
+"""Packages of tui.screens, in the order in which their screens are listed."""
+
+
+def _registered() -> Iterator[Registration]:
+    for package in PACKAGES:
+        # by name: this package is a layer below the screens, and must not import them
+        yield from import_module(f"tui.screens.{package}.registration").REGISTERED
+
+
+SCREENS: tuple[Registration, ...] = tuple(_registered())
+TABBED = tuple(screen for screen in SCREENS if screen.digit)
+"""Screens with a digit key and a tab."""
+EVERYWHERE = tuple(screen.name for screen in SCREENS)
+"""Names of all screens."""
+
 
 app_action = partial(Action, screens=EVERYWHERE, app=True)
 stops = partial(Action, screens=EVERYWHERE, app=True, first=True)

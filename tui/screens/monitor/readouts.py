@@ -1,12 +1,13 @@
 """Large readouts: output frequency, motor current, and one more if there is room.
 
-Each has a frame with its name and unit, its extremes on the page of the curve, and a bar. Pure
-functions of a view.
+Their digits are three rows high, drawn with box characters. Each has a frame with its name and
+unit, its extremes on the page of the curve, and a bar. Pure functions of a view.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
 from functools import lru_cache
 
 from rich.style import Style
@@ -20,11 +21,85 @@ from tui.session.shown import Quality, Shown
 from tui.widgets.drawing import short
 from tui.widgets.gauge import gauge
 from tui.widgets.palette import BAR, BAR_REST, FAINT, LINE, PLAIN, STALE, STRONG, age_text
-from tui.widgets.readout import ROWS, big, dashes, readout_cells
 
 from .curves import bar_end
 from .time_axis import points_of_page
 from .view import View, bar_number, directed, end_of
+
+ROWS = 3
+DIGIT_CELLS = 3
+GLYPHS: Mapping[str, tuple[str, str, str]] = {
+    "0": ("┌─┐", "│ │", "└─┘"),
+    "1": ("  ╷", "  │", "  ╵"),
+    "2": ("╶─┐", "┌─┘", "└─╴"),
+    "3": ("╶─┐", "╶─┤", "╶─┘"),
+    "4": ("╷ ╷", "└─┤", "  ╵"),
+    "5": ("┌─╴", "└─┐", "╶─┘"),
+    "6": ("┌─╴", "├─┐", "└─┘"),
+    "7": ("╶─┐", "  │", "  ╵"),
+    "8": ("┌─┐", "├─┤", "└─┘"),
+    "9": ("┌─┐", "└─┤", "╶─┘"),
+    "-": ("  ", "╶─", "  "),
+    ".": (" ", " ", "."),
+    " ": (" ", " ", " "),
+}
+"""The three rows of each character; a minus is two cells wide, a point one."""
+PLAIN_GLYPHS: Mapping[str, tuple[str, str, str]] = {
+    "0": (" _ ", "| |", "|_|"),
+    "1": ("   ", "  |", "  |"),
+    "2": (" _ ", " _|", "|_ "),
+    "3": (" _ ", " _|", " _|"),
+    "4": ("   ", "|_|", "  |"),
+    "5": (" _ ", "|_ ", " _|"),
+    "6": (" _ ", "|_ ", "|_|"),
+    "7": (" _ ", "  |", "  |"),
+    "8": (" _ ", "|_|", "|_|"),
+    "9": (" _ ", "|_|", " _|"),
+    "-": ("  ", "_ ", "  "),
+    ".": (" ", " ", "."),
+    " ": (" ", " ", " "),
+}
+"""The same in ASCII, for terminals without box characters."""
+DASH = ("   ", "╶─╴", "   ")
+"""One digit of a missing number."""
+
+
+def readout_cells(decimals: int, *, signed: bool, whole: int = 3) -> int:
+    """The width of a number with this many digits before and after the point."""
+    point = 1 + DIGIT_CELLS * decimals if decimals else 0
+    return (2 if signed else 0) + DIGIT_CELLS * whole + point
+
+
+def big(text: str, width: int, *, plain: bool = False) -> list[str]:
+    """A number in three rows, right-aligned in exactly `width` cells.
+
+    A number that is too wide loses decimals first. If it is still too wide, or is not a number, the
+    text is shown small in the lowest row. With `plain` it is drawn in ASCII.
+    """
+    glyphs = PLAIN_GLYPHS if plain else GLYPHS
+    for shown in _shorter(text):
+        rows = ["".join(glyphs[character][row] for character in shown) for row in range(ROWS)]
+        if len(rows[0]) <= width:
+            return [row.rjust(width) for row in rows]
+    return [" " * width, " " * width, text[:width].rjust(width)]
+
+
+def dashes(width: int) -> list[str]:
+    """Three dashes instead of an unknown number."""
+    return ["".join(part[row] for part in (DASH,) * 3).rjust(width)[:width] for row in range(ROWS)]
+
+
+def _shorter(text: str) -> list[str]:
+    """The number, then the number with fewer and fewer decimals; empty if it is not a number."""
+    places = len(text.partition(".")[2])
+    if not text or not set(text) <= GLYPHS.keys():
+        return []
+    try:
+        number = Decimal(text)
+    except ArithmeticError:
+        return []
+    return [text, *(f"{number:.{left}f}" for left in range(places - 1, -1, -1))]
+
 
 SIGN_CELLS = 5
 """Extra cells of the frequency's readout, for its sign and a third digit."""

@@ -26,8 +26,14 @@ from ..keys.action import MONITOR
 from ..keys.table import bindings, keys_line
 from ..state_words import stands_by
 from .arrange import READOUT_ROWS, WIDE, Arrangement, arrange
-from .assembly import codes_beside, curve_or_table, monitor_parts, tables, watched_words
-from .motor import other_values
+from .assembly import (
+    codes_beside,
+    curve_or_table,
+    monitor_parts,
+    other_values,
+    tables,
+    watched_words,
+)
 from .readouts import framed
 from .time_cursor import CursorKeys, TimeCursor
 from .view import View

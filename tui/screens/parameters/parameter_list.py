@@ -1,10 +1,15 @@
-"""The list of the Parameters screen: its lines, its cursor and its visible part."""
+"""The list of the Parameters screen and the column of groups; common parts of its keys."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from rich.text import Text
+from textual.widgets import Input
+
+from tui.drive.profile.profile import UNVERIFIED, Profile
+from tui.drive.profile.schema import StartUpStep
 from tui.drive.settings.selection import (
     FILTERS,
     Choice,
@@ -15,11 +20,119 @@ from tui.drive.settings.selection import (
     home_group,
     rows,
 )
+from tui.session.console import DriveConsole
 from tui.session.settings.editor import Editor
+from tui.widgets.drawing import fitted_names, wrapped
+from tui.widgets.fields import WordField
+from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, PLAIN, STRONG
 
-from .group_view import GroupEntry
-from .start_up_view import start_up_items
+from ..command.teaching import TeachKeys
 from .table_view import TableLine, items_of
+
+FILTER_LABELS: dict[str, str] = {
+    "not factory": "Changed",
+    "start-up": "Commissioning",
+    "favorites": "Favorites",
+    "staged": "Staged",
+    "differs": "Differs",
+    "unsaved": "Unsaved",
+    "recent": "Recent",
+    "settings": "All settings",
+    "read-only": "Read only",
+    "unverified": "All unverified",
+    "all": "Everything",
+}
+"""Names of the filters."""
+STYLES = {"staged": ATTENTION, "unsaved": ALARM}
+"""Styles of filters whose number needs attention."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroupEntry:
+    """One line of the column: its choice, and the number of its parameters."""
+
+    choice: Choice
+    count: int | None = None
+    """None if no number is shown."""
+    pinned: bool = False
+    """True if it stays above the scrolled groups."""
+
+    @property
+    def label(self) -> str:
+        """Its name with its number, unless that is zero."""
+        name = self.choice.group or FILTER_LABELS[self.choice.filter]
+        return f"{name} {self.count}" if self.count else name
+
+
+def group_lines(entries: Sequence[GroupEntry], chosen: Choice, width: int, room: int) -> list[Text]:
+    """The lines that fit: the pinned ones, and those around the chosen one."""
+    pinned = [entry for entry in entries if entry.pinned]
+    rest = [entry for entry in entries if not entry.pinned]
+    left = max(1, room - len(pinned))
+    at = next((n for n, entry in enumerate(rest) if entry.choice == chosen), 0)
+    top = min(max(0, at - left // 2), max(0, len(rest) - left))
+    shown = rest[top : top + left]
+    labels = fitted_names(tuple(entry.label for entry in entries), width - 2)
+    lines = [_line(entry, chosen, labels[entry.label], width) for entry in [*pinned, *shown]]
+    if (below := len(rest) - top - len(shown)) > 0 and len(shown) > 1:
+        lines[-1] = Text(f" … {below + 1} more", FAINT, no_wrap=True)
+    return lines[:room]
+
+
+def _line(entry: GroupEntry, chosen: Choice, label: str, width: int) -> Text:
+    here = entry.choice == chosen
+    group = entry.choice.group or entry.choice.filter == "start-up"
+    style = STRONG if here else PLAIN if entry.count or group else FAINT
+    if entry.count and not here:
+        style = STYLES.get(entry.choice.filter, style)
+    text = Text(f" {label:<{width - 2}} ", style, no_wrap=True)
+    if here:
+        text.stylize(CURSOR)
+    return text
+
+
+TEXT_WIDTH, TEXT_LINES = 50, 4
+"""Columns and lines of the text of a step without parameters, on the smallest screen."""
+
+GROUNDS_WORDS = {
+    "analogy": "as on a sister family",
+    "unverified": "order of steps unverified",
+    "practice": "general practice",
+}
+"""Source of a step and its place, if the family's own documents do not state it."""
+
+
+def start_up_items(profile: Profile) -> list[TableLine]:
+    """One heading per step; below it its parameters, or the text of a step without parameters."""
+    found: list[TableLine] = []
+    for number, step in enumerate(profile.data.start_up, start=1):
+        mark = " ?" if step.confidence in UNVERIFIED else ""
+        found.append(TableLine(group=f"{number} {step.step}{mark}"))
+        found += [TableLine(code) for code in step.parameters]
+        if not step.parameters:
+            lines = wrapped(step.text, TEXT_WIDTH, TEXT_LINES)
+            found += [TableLine(text=line) for line in lines]
+    return found
+
+
+def step_help(profile: Profile, code: str) -> str:
+    """Return the text of a parameter's step; empty without a step."""
+    step = next(
+        (
+            start_up_step
+            for start_up_step in profile.data.start_up
+            if code in start_up_step.parameters
+        ),
+        None,
+    )
+    return "" if step is None else _words_of_step(step)
+
+
+def _words_of_step(step: StartUpStep) -> str:
+    grounds = GROUNDS_WORDS.get(step.confidence, "")
+    head = f"{step.step} ({grounds})" if grounds else step.step
+    return f"{head}: {step.text} {step.note}".rstrip()
+
 
 FIRST: tuple[FilterId, ...] = ("not factory", "favorites", "staged", "unsaved")
 """Filters above the groups; after a comparison also `differs`."""
@@ -171,3 +284,48 @@ def shows_steps(listed: ParameterList) -> bool:
     """Return True if a list shows the commissioning steps."""
     chosen = listed.chosen
     return chosen.filter == "start-up" and not chosen.group and not listed.searched
+
+
+class ParameterKeys(TeachKeys):
+    """The base of the keys that stage, write and handle parameter sets."""
+
+    def __init__(self, console: DriveConsole) -> None:
+        super().__init__()
+        self.console = console
+        self.session = console.session
+        self.listed = ParameterList()
+        self.reading = ""
+        """Progress of reading for a file or a comparison; empty without one."""
+
+    @property
+    def editor(self) -> Editor:
+        """Known values and staged edits; stays with the drive while the panel runs."""
+        return self.console.editor
+
+    def list_again(self) -> None:
+        """Fill the list again, for the present choice and search."""
+        for search in self.query(WordField):  # none once the screen was left
+            self.listed.fill(self.editor, search.words)
+            self.look()
+
+    def clear_search(self) -> None:
+        """Clear the search, and show the chosen group or selection."""
+        for search in self.query("#search").results(Input):
+            with search.prevent(Input.Changed):
+                search.value = ""
+        self.list_again()
+
+    def note(self, text: str, keys: str = "") -> None:
+        """Report the result of a key, and the next `keys` on this screen."""
+        self._add("told", text)
+        if keys:
+            self.hint_keys(keys)
+
+    def _refuse(self, text: str) -> None:
+        """Report why something was not done."""
+        self._add("refused", text)
+
+    def _add(self, kind: str, text: str) -> None:
+        if text:
+            self.app.events.add(kind, text, self.session.device)
+        self.look()

@@ -20,9 +20,7 @@ from tui.screens.parameters.detail_view import (
     parameter_lines,
     status_line,
 )
-from tui.screens.parameters.group_view import FILTER_LABELS, group_lines
-from tui.screens.parameters.parameter_list import shows_steps
-from tui.screens.parameters.start_up_view import step_help
+from tui.screens.parameters.parameter_list import FILTER_LABELS, group_lines, shows_steps, step_help
 from tui.screens.parameters.table_view import head_line, layout_of, row_line
 from tui.widgets.fields import JOINS_KEY, WordField
 from tui.widgets.lines import Lines

@@ -28,7 +28,7 @@ from tui.widgets.plain import Plain
 from ..dialogs.ask import fault_of_new
 from ..dialogs.pick_file import FileAbout
 from ..dialogs.question import KeyQuestion, hint
-from .parameter_keys import ParameterKeys
+from .parameter_list import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet

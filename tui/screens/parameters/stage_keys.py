@@ -7,7 +7,7 @@ from tui.drive.settings.in_force import limit_passed
 from tui.drive.taught_profile import why_not_taught
 from tui.session.settings.editor import Editor
 
-from .parameter_keys import ParameterKeys
+from .parameter_list import ParameterKeys
 
 WAITING_NAMED = 3
 """Codes that are listed as waiting for standstill; more are counted."""

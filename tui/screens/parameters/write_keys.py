@@ -26,7 +26,7 @@ from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain
 
 from ..dialogs.question import KeyQuestion, hint
-from .parameter_keys import ParameterKeys
+from .parameter_list import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile

@@ -21,8 +21,8 @@ from ..read.upload import Upload, setting_codes
 from ..running.ending import Ending
 from ..running.errors import MotorStopped, MotorTripped, NotStopped
 from .carry_out import carry_out_step
-from .high_speed import HighSpeed, read_high_speed
 from .motion import TEST_PERIOD, AcceptanceEnded, MotionBench
+from .plan import HighSpeed, read_high_speed
 from .result import AcceptanceResult, StepResult, settings_hash
 from .step_file import MEASURED, AcceptanceFile
 from .step_work import AskTurned, StepWork

@@ -1,8 +1,14 @@
-"""Plan of an acceptance test for a person: which steps run the motor, how, and for how long."""
+"""Plan of an acceptance test for a person: which steps run the motor, how, and for how long.
+
+The high speed of a drive is the highest reference that its own setting allows.
+"""
 
 from __future__ import annotations
 
-from .high_speed import HighSpeed
+from typing import NamedTuple
+
+from ..command.reference import reference_codes, reference_limits
+from ..console import DriveConsole
 from .step_file import AcceptanceFile
 from .steps import (
     AcceptanceStep,
@@ -15,6 +21,25 @@ from .steps import (
     StopStep,
     moves_motor,
 )
+
+
+class HighSpeed(NamedTuple):
+    """Highest reference of a drive in Hz, and the code of the setting."""
+
+    hertz: float
+    code: str
+
+
+async def read_high_speed(console: DriveConsole) -> HighSpeed | None:
+    """Return the high speed of a drive; None if it has none. Raises the line's errors."""
+    profile = console.session.profile
+    parameter = profile.quantity("command_frequency")
+    if parameter is None:
+        return None
+    readings = await console.read(reference_codes(profile))
+    _, high, code = reference_limits(profile, readings, parameter)
+    return None if high is None else HighSpeed(float(high), code)
+
 
 RAMP_SLACK, RAMP_FACTOR = 2.0, 1.5
 """A ramp is waited for this factor of its time, and these seconds longer; then it has failed."""

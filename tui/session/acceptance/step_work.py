@@ -9,9 +9,8 @@ from typing import Any
 from tui.drive.settings.parameter_set import ParameterSet
 
 from ..running.watching import latest_of
-from .high_speed import HighSpeed
 from .motion import Motion, MotionBench, StepFailed
-from .plan import longest_of
+from .plan import HighSpeed, longest_of
 from .result import StepResult
 from .step_file import AcceptanceFile
 from .steps import (

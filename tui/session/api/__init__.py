@@ -9,8 +9,7 @@ from tui.drive.errors import DriveError
 
 from ..running.errors import MotorStopped, MotorTripped, NotStopped
 from ..settings.typed import WouldRound
-from .async_drive import AsyncDrive
-from .drive import Drive
+from .drive import AsyncDrive, Drive
 from .line import AsyncDriveLine, DriveLine, open_drives, open_drives_async
 from .running_motor import AsyncRunningMotor, RunningMotor
 from .values import DriveValue, NotWritten, Sample

@@ -27,8 +27,7 @@ from ..read.reader import Reader
 from ..sharing.orphan_motors import OrphanMotorGuard
 from ..starts.keeper import StartKeeper
 from ..teaching.teacher import Teacher
-from .async_drive import AsyncDrive
-from .drive import Drive
+from .drive import AsyncDrive, Drive
 from .drive_calls import STANDS_WITHIN, DriveCalls
 from .guarded_run import GuardedRuns
 from .work import awaited, uninterrupted, waited

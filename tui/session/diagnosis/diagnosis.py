@@ -13,10 +13,9 @@ from tui.drive.sentences import all_of
 
 from . import next_steps as steps
 from .evidence import DiagnosticEvidence
-from .garbled import speed_text
 from .gateway_probe import GATEWAY_CODES, gateway_codes
-from .sick import CERTAIN
-from .sick_rungs import GATEWAY_RUNGS, SICK_RUNGS, Check, first_sentence
+from .next_steps import speed_text
+from .sick_rungs import CERTAIN, GATEWAY_RUNGS, SICK_RUNGS, Check, first_sentence
 
 HELD_BACK = 8
 """Latency of an adapter in ms from which it is reported."""

@@ -2,7 +2,7 @@
 
 Some drives trip if communication stops (communication timeout). While this program is attached,
 the keeper reads them at least three times in each timeout, before polls and an operator's requests.
-Further reads show the state of the drives in a list.
+Further reads show the state of the drives in a list, and the load of each motor.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from tui.drive.chart import ENABLED_KINDS, watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
+from tui.drive.shown import number_of
 from tui.safety import READS_PER_TIMEOUT, WARNED_AT_SHARE
 
 from ..drive import DriveSession
@@ -27,13 +28,55 @@ from ..drive_state import DriveState, drive_state
 from ..read.order_check import check_byte_order
 from ..read.presence import UNKNOWN_TIMEOUT, alive_read
 from ..read.reader import Reader
+from ..reading import reading_of
+from ..shown import Shown
 from ..timeout_report import TimeoutWatch
 from .alarms import FaultOnsets
-from .load import unread_limit
 from .look import Look, last_that_brought
 from .monitor import Monitor
 from .timeout import TimeoutWarning, has_begun, read_timeout
 from .trend import readout_parameter
+
+
+def _limit(profile: Profile) -> str:
+    """Return the upper limit of the current: a number, or the code of its parameter."""
+    current = profile.quantity("motor_current")
+    values = profile.data.monitoring.values
+    return next((v.high for v in values if current and v.parameter == current.code), "")
+
+
+def unread_limit(session: DriveSession) -> list[str]:
+    """Return the code of the rated current if it was neither read nor refused yet."""
+    code, image = _limit(session.profile), session.image
+    if session.profile.get(code) is None or code in image.raws or code in image.refused:
+        return []
+    return [code]
+
+
+def share_of_limit(session: DriveSession, current: Shown | None) -> float | None:
+    """Return the motor current divided by its limit; None if one of them is not known."""
+    limit = _limit_number(session)
+    if current is None or not limit:
+        return None
+    number = reading_of(current).number
+    return None if number is None else number / limit
+
+
+def _limit_number(session: DriveSession) -> float | None:
+    profile, raws = session.profile, session.image.raws
+    limit = _limit(profile)
+    parameter = profile.get(limit)
+    if parameter is None:
+        try:
+            return float(limit)
+        except ValueError:
+            return None
+    raw = raws.get(parameter.code)
+    if raw is None:
+        return None
+    number = number_of(profile, parameter, raw, raws)
+    return None if number is None else float(number)
+
 
 log = logging.getLogger(__name__)
 

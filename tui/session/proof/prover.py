@@ -24,8 +24,7 @@ from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer, raw_text
 from ..work import Permit
-from .result import UNNAMED_FAULT, ProofResult
-from .silences import Bracket, silences
+from .result import UNNAMED_FAULT, Bracket, ProofResult, silences
 
 PAUSED_FOR_TEST = "Its communication timeout is being tested: polling is paused."
 STOP_CHECK_INTERVAL = 0.05

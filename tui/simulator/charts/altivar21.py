@@ -18,13 +18,16 @@ from tui.drive.profile.schema import Parameter, Quantity
 from ..body import Body, Fallback
 from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
-from .altivar21_keypad import (
+from .altivar21_words import (
+    ANALOG_HZ,
     KEYPAD_COMMAND,
     KEYPAD_REFERENCE,
     LOCAL_STATUS,
     Altivar21Keypad,
+    outputs,
+    show_altivar21_words,
+    take_effect,
 )
-from .altivar21_words import ANALOG_HZ, outputs, show_altivar21_words, take_effect
 
 INPUT_FUNCTIONS = {"F": "F111", "R": "F112", "RES": "F113"}
 FORCED_LOCAL, SECOND_REFERENCE, PRESET_INPUT = 48, 38, 6

@@ -8,7 +8,7 @@ from decimal import ROUND_HALF_UP, Decimal
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Model, Parameter, Quantity
-from tui.drive.settings.multiple import counts_of
+from tui.drive.settings.limits import counts_of
 from tui.drive.values import is_enumeration, raw_range, type_range
 
 from .motor import RatingPlate, rating_of

@@ -1,27 +1,192 @@
-"""Self-test of a profile: each step tests one claim of the file on the simulated drive."""
+"""Self-test of a profile: each step tests one claim of the file on the simulated drive.
+
+The steps here are about commands, stops from every state, and references.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import partial
 
+from tui.drive.orders import STOP_ORDERS, optional_bits
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.profile_frame import READING, frame_contents
-from tui.drive.profile.schema import Parameter, ProfileFrame
+from tui.drive.profile.rules.charts import RUN_ORDERS
+from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, ProfileFrame, ReferenceWay
 from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.shown import depends_on, shown_text
-from tui.drive.values import (
-    from_words,
-    is_enumeration,
-    raw_range,
-    type_range,
-    word_count,
-)
+from tui.drive.values import from_words, is_enumeration, raw_range, type_range, word_count
+from tui.drive.words import unsigned
 
-from .command_steps import command_steps
+from .bench_motion import (
+    REACHED_SECONDS,
+    need_reset,
+    present_hertz,
+    present_number,
+    refer_motor,
+    running_chart,
+    spin_motor,
+    start_motor,
+    stop_motor,
+    top_hertz,
+    trip_drive,
+)
 from .drive_steps import drive_steps
 from .proof_bench import ProofBench, Unproved
 from .proof_step import ProofStep, proof_step
+
+HZ_TOLERANCE = 0.3
+SLIP_HZ = 3.0
+"""Most slip of a motor whose speed is the feedback."""
+SHARES = (0.1, 0.25, 0.5, 0.75, 1.0)
+"""Points of the range of a reference at which it is compared with its feedback."""
+STOPS_PROVED: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel", "emergency-stop")
+
+
+def command_steps(profile: Profile) -> Iterator[ProofStep]:
+    """Test the commands, the stops and the references."""
+    for index, chart in enumerate(profile.data.charts):
+        if chart.orders:
+            yield from _orders(profile, chart, ("charts", index))
+            yield from _stops(profile, chart, ("charts", index))
+    yield from _references(profile)
+
+
+def _orders(profile: Profile, chart: Chart, at: TomlPath) -> Iterator[ProofStep]:
+    for place, order in enumerate(chart.orders):
+        title = f"{order.id} ({order.name}) leads to its state"
+        yield proof_step((*at, "orders", place), title, partial(_order, profile, chart, order))
+
+
+def _order(profile: Profile, chart: Chart, order: Order) -> None:
+    bench = ProofBench(profile, chart, order)
+    if order.id in RUN_ORDERS:
+        spin_motor(bench, order.id, order)
+    elif order.id == "reset":
+        trip_drive(bench)
+        bench.send("reset", order)
+        need_reset(bench)
+    elif order.id in (*STOP_ORDERS, "dc-braking"):
+        if not start_motor(bench, "forward"):
+            return
+        own = bench.own().id
+        stop_motor(bench, order.id, order)
+        _need_transition(bench, own, order)
+    else:
+        bench.send(order.id, order)
+
+
+def _need_transition(bench: ProofBench, source: str, order: Order) -> None:
+    """Raise Unproved if the transitions declare a state that the drive has not shown."""
+    chart = bench.chart
+    if (order.parameter or chart.command) != chart.command or not order.words:
+        return
+    kept, last = optional_bits(chart, chart.command), unsigned(order.words[-1])
+    for step in chart.transitions:
+        same = step.command is not None and not (unsigned(step.command) ^ last) & ~kept
+        if step.source == source and same and not _follows(chart, step.target) & set(bench.seen):
+            seen = ", ".join(bench.seen[-3:])
+            raise Unproved(f"the drive does not show {step.target}, but {seen}")
+
+
+def _follows(chart: Chart, state: str) -> set[str]:
+    """Return a state, and those to which the drive goes from it on its own."""
+    found, left = {state}, [state]
+    while left:
+        at = left.pop()
+        for step in chart.transitions:
+            if step.source == at and step.command is None and step.target not in found:
+                found.add(step.target)
+                left.append(step.target)
+    return found
+
+
+def _stops(profile: Profile, chart: Chart, at: TomlPath) -> Iterator[ProofStep]:
+    for id in STOPS_PROVED:
+        places = [place for place, order in enumerate(chart.orders) if order.id == id]
+        if places:
+            path = (*at, "orders", places[0])
+            for state, lead in _LEADS.items():
+                title = f"{id} stops from {state}"
+                yield proof_step(path, title, partial(_stop_from, profile, chart, id, lead))
+
+
+def _stop_from(
+    profile: Profile, chart: Chart, id: OrderId, lead: Callable[[ProofBench], bool]
+) -> None:
+    order = next(order for order in chart.orders if order.id == id)
+    bench = ProofBench(profile, chart, order)
+    if not lead(bench):
+        return
+    own = bench.own()
+    usable = [o for o in chart.orders if o.id == id and (not o.states or own.id in o.states)]
+    if usable or id in ("stop", "quick-stop", "freewheel"):
+        stop_motor(bench, id)
+
+
+def _at_rest(bench: ProofBench) -> bool:
+    return True
+
+
+def _slowing(bench: ProofBench) -> bool:
+    if not start_motor(bench, "forward"):
+        return False
+    bench.send("stop")
+    bench.wait(0.1)
+    return True
+
+
+def _in_fault(bench: ProofBench) -> bool:
+    if start_motor(bench, "forward"):
+        bench.wait(0.5)
+    trip_drive(bench)
+    return True
+
+
+_LEADS: dict[str, Callable[[ProofBench], bool]] = {
+    "standstill": _at_rest,
+    "forward": lambda bench: start_motor(bench, "forward"),
+    "reverse": lambda bench: start_motor(bench, "reverse"),
+    "a ramp stop": _slowing,
+    "a fault": _in_fault,
+}
+"""States from which stops are tested, and how the drive gets there; False if it cannot."""
+
+
+def _references(profile: Profile) -> Iterator[ProofStep]:
+    chart = running_chart(profile)
+    for index, way in enumerate(profile.data.references if chart is not None else ()):
+        feedback = _feedback(profile, way)
+        name = feedback.code if feedback is not None else "the motor"
+        title = f"{way.parameter} and {name} agree"
+        yield proof_step(("references", index), title, partial(_compare, profile, chart, way))
+
+
+def _feedback(profile: Profile, way: ReferenceWay) -> Parameter | None:
+    return profile.get(way.feedback) or profile.quantity("output_frequency")
+
+
+def _compare(profile: Profile, chart: Chart | None, way: ReferenceWay) -> None:
+    bench = ProofBench(profile, chart)
+    low, high = present_number(bench, profile.quantity("low_speed")) or 0.0, top_hertz(bench)
+    refer_motor(bench, low + (high - low) * SHARES[0], way)
+    bench.send("forward")
+    for share in SHARES:
+        hz = low + (high - low) * share
+        refer_motor(bench, hz, way)
+        if not bench.until(partial(_near, bench, hz), REACHED_SECONDS):
+            raise Unproved(f"{hz:.1f} Hz: the motor turns at {bench.hz:.1f} Hz")
+        bench.wait(0.5)
+        feedback = _feedback(profile, way)
+        shown = present_hertz(bench, feedback)
+        slip = SLIP_HZ if feedback is not None and feedback.unit == "rpm" else 0.0
+        if shown is not None and abs(shown - hz) > HZ_TOLERANCE + slip:
+            raise Unproved(f"{hz:.1f} Hz: the feedback shows {shown:.1f} Hz")
+    stop_motor(bench, "stop")
+
+
+def _near(bench: ProofBench, hz: float) -> bool:
+    return abs(bench.hz - hz) < HZ_TOLERANCE
 
 
 def prove_profile(profile: Profile) -> Iterator[ProofStep]:

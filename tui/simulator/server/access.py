@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Function, Multiple, Parameter
-from tui.drive.settings.multiple import counts_of
+from tui.drive.settings.limits import counts_of
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_enumeration, is_field, raw_range, to_words, word_count
 

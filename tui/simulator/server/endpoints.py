@@ -17,11 +17,29 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from pathlib import Path
+from typing import Protocol
 
 from ..errors import SimulatorError
 from ..spec import LineTiming
 from .client_settings import ClientSettings, set_up_terminal, settings_of_terminal
 from .conversation import Conversation
+
+STREAM_PAUSE = 0.005
+"""Longest pause in s between two reads of an opened port without data."""
+
+
+class ByteStream(Protocol):
+    """Open port of the caller: reads with a short timeout, writes, closes."""
+
+    def read(self, size: int, /) -> bytes:
+        """Return up to `size` bytes; b"" after the timeout."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Write all bytes."""
+
+    def close(self) -> None:
+        """Close the port."""
+
 
 CHUNK = 4096
 
@@ -65,6 +83,38 @@ class Endpoint(ABC):
 
     @abstractmethod
     def _shut(self) -> None: ...
+
+
+class StreamEndpoint(Endpoint):
+    """Port that the caller opened; it is closed at the end, and cannot be plugged in again."""
+
+    def __init__(self, converse: Callable[[], Conversation], stream: ByteStream) -> None:
+        super().__init__("simulated line, port", converse)
+        self._stream = stream
+        self.error: OSError | None = None
+        """Error that ended the port, if any."""
+
+    def _open(self) -> None:
+        return
+
+    def _work(self) -> None:
+        conversation = self._converse()
+        try:
+            while not self._stopping.is_set():
+                if data := self._stream.read(CHUNK):
+                    conversation.feed(data, time.monotonic())
+                else:
+                    time.sleep(wait_time(conversation, STREAM_PAUSE) or 0.0)
+                if out := conversation.poll(time.monotonic()):
+                    self._stream.write(out)
+        except OSError as error:
+            self.error = error
+
+    def _wake(self) -> None:
+        return
+
+    def _shut(self) -> None:
+        self._stream.close()
 
 
 def wait_time(conversation: Conversation, longest: float | None) -> float | None:
