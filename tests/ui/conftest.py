@@ -30,6 +30,12 @@ def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let Line list no serial ports of this machine."""
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+@pytest.fixture(autouse=True)
 def patience(patient_lines: None) -> None:
     """Make lines wait long, so that a busy machine does not matter; tests/bus tests the timing."""
 

@@ -33,11 +33,6 @@ from .test_parameter_flows import open_file
 from .walk import every_step
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 async def to_blocks(made: Bench, sees: str = "ETA") -> None:
     await made.pilot.press("4")
     await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))

@@ -26,7 +26,6 @@ from tui.session.events import EventLog
 
 from . import fakes
 from .test_flows import demo, shown, to_monitor, until
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 
 
 def panel(start: str, opener: Callable[..., object] = open_line) -> DrivePanelApp:

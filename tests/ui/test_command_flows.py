@@ -204,11 +204,6 @@ async def bench(
         simulation.stop()
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 async def test_armed_drive_is_never_reported_as_disarmed() -> None:
     async with bench("atv71") as made:
         await made.pilot.press("r")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from textual.widgets import Input
 
 from tui.screens.monitor.screen import MonitorScreen
@@ -10,11 +9,6 @@ from tui.simulator import DriveSpec
 
 from .test_flows import shown, until
 from .test_search_flows import output, panel
-
-
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 async def test_drive_with_a_contradicting_profile_is_not_armed() -> None:

@@ -43,11 +43,6 @@ def message(app: DrivePanelApp) -> str:
     return " ".join(" ".join(lines).split())
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 @pytest.mark.internal_errors
 async def test_unforeseen_error_is_one_line_and_the_panel_continues() -> None:
     def broken(*_: Any, **__: Any) -> OpenLine:

@@ -48,11 +48,6 @@ def demo(*_: object, **__: object) -> OpenLine:
     return demo_line(DRIVES)
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 async def until(pilot: Pilot[None], holds: Callable[[], bool], seconds: float = 60.0) -> None:
     """Wait for a condition of the screen; a slow machine only waits longer."""
     end = time.monotonic() + seconds

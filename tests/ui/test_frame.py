@@ -71,11 +71,6 @@ async def panel() -> AsyncIterator[Panel]:
         yield made
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 @pytest.mark.parametrize("key", kept(["1", "2", "3", "4", "5", "6", "7", "m"], "1", "3"))
 async def test_status_bar_shows_the_motor_on_every_screen(key: str) -> None:
     async with panel() as made:

@@ -15,7 +15,6 @@ from tui.screens.monitor.screen import MonitorScreen
 from tui.simulator.troubles import FaultRates
 
 from .test_frame import Panel, panel
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 
 
 @asynccontextmanager

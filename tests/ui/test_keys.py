@@ -66,11 +66,6 @@ LETTERS = [*"wW", *(key for key in string.ascii_letters if key not in "kewWuU"),
 """Every other letter; letters that write come first, letters that drop pending work last."""
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 def meanings() -> dict[str, set[str]]:
     """By key, the actions that it has over all screens."""
     found: dict[str, set[str]] = defaultdict(set)

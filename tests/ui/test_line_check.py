@@ -45,11 +45,6 @@ __all__ = ["adapters"]
 BY_ID = "serial:/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0,19200,8E1"
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 @pytest.fixture
 def simulation() -> Iterator[Simulation]:
     """Two drives with running motors; the second does not identify itself."""

@@ -25,7 +25,6 @@ from tui.simulator import DriveSpec, Simulation
 from tui.terminal.last_words import FAILED
 
 from .test_command_flows import Bench, knows_the_state
-from .test_command_flows import no_ports as no_ports  # the fixture is for these tests too
 from .test_flows import until
 
 TEXT = "a screw is loose"

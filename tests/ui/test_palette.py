@@ -38,11 +38,6 @@ SCREENS = {
 WORDS = sorted({word for action in ACTIONS for word in action.help.casefold().split()})
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 def test_every_typed_word_is_in_the_results() -> None:
     for query in ("eeprom", "save eeprom", "EEPROM sav", "frames", "ramp", "trip file"):
         found = find(query, "monitor")

@@ -30,11 +30,6 @@ from .test_flows import arm, picture, shown, until
 from .test_parameter_pictures import editor_of, failed, panel
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 async def to_parameters(made: Bench) -> ParametersScreen:
     await made.pilot.press("3")
     await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))

@@ -55,11 +55,6 @@ class HandClock(fakes.StillClock):
         return self.now
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 IS_EARLY = Question._is_early
 
 

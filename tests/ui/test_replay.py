@@ -19,7 +19,6 @@ from tui.session.journal import Journal
 from tui.widgets.lines import Lines
 
 from .test_frame import Panel
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 from .test_text_is_text import MARKUP
 
 LIVE = "sim:atv71@1"

@@ -15,7 +15,6 @@ from tui.session.connect.open_line import OpenLine, open_line
 
 from .fakes import CHANNELS, FAULT, RUNNING, STORED
 from .test_frame import Panel
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 from .test_pictures import SIZES, Compare
 
 SECONDS = 120

@@ -18,7 +18,6 @@ from tui.session.monitor.trend import TrendPoint
 from tui.widgets.lines import Lines
 
 from .test_frame import Panel
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 
 FRAME = {"strip", "tabs", "said", "keys", "curve"}
 """Parts that a replay marks; the curve is compared by its points."""

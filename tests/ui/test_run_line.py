@@ -28,11 +28,6 @@ ARROWS = ("up", "down", "pageup", "pagedown")
 CLOSING = ["escape", "q", "n", "y", "x", "r", "v", "f", "a", "3 a", "tab", "left", "delete", "f5"]
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 def edited(line: RunLine, keys: str) -> str:
     """The text after these characters; `<` is Backspace."""
     for key in keys:

@@ -6,7 +6,6 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
 
-import pytest
 from textual.pilot import Pilot
 from textual.widgets import Input
 
@@ -19,11 +18,6 @@ from tui.session.paths import recent_lines
 from tui.simulator import DriveSpec, FaultRates, Simulation
 
 from .test_flows import shown, until
-
-
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 @asynccontextmanager

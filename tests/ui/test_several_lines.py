@@ -12,7 +12,6 @@ from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.monitor.line_health import SEVERAL_FRAMES
 
 from .test_frame import Panel
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 
 FIRST, SECOND = "sim:atv71@1", "sim:atv312@1"
 

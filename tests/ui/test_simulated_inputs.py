@@ -18,11 +18,6 @@ from .test_command_flows import Bench, bench, output, writes
 from .test_flows import until
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 async def requested(made: Bench) -> None:
     assert made.app.opened is not None
     made.app.opened.simulation = made.simulation

@@ -15,11 +15,6 @@ from .test_command_flows import Bench, bench, writes
 from .test_flows import shown, until
 
 
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
-
-
 async def pick(made: Bench, code: str) -> None:
     """Select a value on Monitor and open the question for its display value."""
     await made.pilot.press("L")

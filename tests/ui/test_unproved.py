@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import pytest
 from textual.widgets import Input
 
 from tui.screens.dialogs.confirm import Confirm
@@ -11,11 +10,6 @@ from tui.simulator import DriveSpec
 
 from .test_flows import until
 from .test_search_flows import output, panel
-
-
-@pytest.fixture(autouse=True)
-def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 async def test_unproved_profile_is_confirmed_by_a_person_before_arming() -> None:

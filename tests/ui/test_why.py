@@ -24,7 +24,6 @@ from tui.session.events import EventLog
 
 from . import fakes
 from .test_flows import shown, until
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 from .test_frame import panel
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")

@@ -18,7 +18,6 @@ from tui.session.diagnosis.measure import Measure
 from tui.session.diagnosis.reply_evidence import ReplyEvidence
 
 from .test_frame import Panel, panel
-from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 
 
 async def wiring(made: Panel) -> WiringScreen:
