@@ -86,6 +86,13 @@ def test_drive_that_does_not_answer_hinders_no_other(file: Path) -> None:
     assert "Drive 5: as its recipe of 3 settings." in done.stdout
 
 
+def test_drive_of_another_family_is_told_where_its_profile_is_named(file: Path) -> None:
+    with tcp_line("atv71@4", "atv312@5", "--any-settings") as line:
+        output = run(3, "compare", file, line, "-d", "4")
+    assert "correct the profile in the recipe of this drive" in output
+    assert "-p" not in output.split("not compared.")[1]
+
+
 FAULTS = {
     "twice": ("device = 5", "device = 4", "hall2.toml:10: device 4 has two recipes."),
     "no set": ('machine = "pumps.toml"\nignore', "ignore", "hall2.toml:10: name a set: machine,"),

@@ -154,7 +154,7 @@ def restore(
         telling = ResultTelling(Messages(as_json=as_json))
         recipe = recipes.get(target.device)
         if recipe is not None:
-            target = target._replace(profile_id=recipe.profile.id)
+            target = target._replace(profile_id=recipe.profile.id, by_recipe=True)
         session = await connect_drive(opened, target)
         options = Options(line_settings, rating, codes_of(session, confirmed), rounded)
         values, messages = recipe.values if recipe else chosen, telling.messages

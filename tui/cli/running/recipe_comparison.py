@@ -89,7 +89,8 @@ async def _compared(
     rows: list[ComparedRow] = []
     error = ""
     try:
-        session = await connect_drive(opened, Target(line, recipe.device, recipe.profile.id))
+        target = Target(line, recipe.device, recipe.profile.id, by_recipe=True)
+        session = await connect_drive(opened, target)
         values = await take_set(session, settings_only=True)
         rows = recipe.differences(values, all_rows=all_rows)
     except (LineError, DriveError) as fault:

@@ -128,6 +128,8 @@ class Target(NamedTuple):
     """True if a profile counts that the drive contradicts; never for what moves a motor."""
     others: tuple[int, ...] = ()
     """Further addresses on the same line, where a command takes several."""
+    by_recipe: bool = False
+    """True if a recipe names the profile."""
 
     def each(self) -> list[Target]:
         """A target for each drive, in the order in which they were named."""
@@ -328,17 +330,24 @@ async def _check_byte_order(session: DriveSession) -> None:
             await check_byte_order(Reader(session), Priority.OPERATOR_READ)
 
 
+def _way_to_profile(reported: str | None, target: Target) -> str:
+    """Return how to correct a profile that the drive contradicts, where it was named."""
+    if target.by_recipe:
+        return "Check the address, or correct the profile in the recipe of this drive."
+    if not reported:
+        return "Name the profile of that drive."
+    context = click.get_current_context(silent=True)
+    source = None if context is None else context.get_parameter_source("profile_id")
+    named = source is click.core.ParameterSource.DEFAULT_MAP  # by the name of the line
+    return f"Name -p {reported}, or {'correct the settings file' if named else 'leave -p away'}."
+
+
 def _believe_the_person(session: DriveSession, target: Target) -> None:
     """Use a profile that the drive contradicts if --force-profile is given; else raise."""
     from tui.session.connect.contradiction import Contradiction
 
-    reported = session.known_identity.profile
     if not target.force_profile:
-        way = (
-            f"Name -p {reported}, or leave -p away."
-            if reported
-            else "Name the profile of that drive."
-        )
+        way = _way_to_profile(session.known_identity.profile, target)
         raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
     session.bar_unconfirmed()
     say(
