@@ -61,6 +61,8 @@ async def test_number_of_the_nameplate_is_proposed_and_only_staged() -> None:
     async with bench("atv71") as made:
         opened = await start_up(made, "Nameplate")
         assert "drive" not in shown(made.app, "steps").split("UNS on")[1].split("\n")[0]
+        power = shown(made.app, "steps").split("NPR?")[1].split("\n")[0]
+        assert " raw " in power  # no document has its scale
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
         await made.pilot.pause(0.4)

@@ -9,8 +9,10 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.drive.plain import plain
-from tui.drive.profile.profile import Profile
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import is_setting
+from tui.drive.values import Value, is_enumeration
 from tui.session.shown import Shown
 from tui.session.startup.judging import TURNED, StepRow, changed_codes
 from tui.session.startup.start_up import StartUp
@@ -264,8 +266,9 @@ def _label(view: StartUpView, row: StepRow) -> str:
 
 
 def _parameter(view: StartUpView, code: str, width: int) -> Text:
-    name = view.profile[code].name
-    text = Text(f"{code:<6}", STRONG).append(
+    parameter = view.profile[code]
+    name, mark = parameter.name, "" if is_verified(parameter) else "?"
+    text = Text(f"{code + mark:<6}", STRONG).append(
         f" {cut(name, max(NAME_WIDTH, width - 9 - 2 * VALUE_ROOM))} ", PLAIN
     )
     text.append_text(_value(view, code))
@@ -281,12 +284,20 @@ def _value(view: StartUpView, code: str) -> Text:
         return none
     if reading.absent:
         return Text("not in this drive", FAINT)
+    parameter = view.profile[code]
     return reading.drawn(
         view.now,
-        current=lambda value: Text(value.display, STRONG),
-        old=lambda value, age: Text(f"{value.display}, {age_text(age)} old", STALE),
+        current=lambda value: Text(_value_text(parameter, value), STRONG),
+        old=lambda value, age: Text(f"{_value_text(parameter, value)}, {age_text(age)} old", STALE),
         missing=none,
     )
+
+
+def _value_text(parameter: Parameter, value: Value) -> str:
+    """Return a value; a number as raw if no document has its scale."""
+    is_plain = not (value.unit or parameter.bits) and parameter.scale == "1"
+    unknown = is_plain and not is_verified(parameter) and not is_enumeration(parameter)
+    return f"raw {value.display}" if unknown else value.display
 
 
 def foot_lines(view: StartUpView, width: int) -> list[Text]:
