@@ -171,6 +171,8 @@ def bursts(
     for number in range(count):
         if number % 20 == 0:
             home(panel)
+        if beside is not None:
+            _disarm(beside)
         arm(panel)
         lead(panel, chance)
         stopping = panel
@@ -213,6 +215,13 @@ def bursts(
         counted.other_writes += behind.other_writes
         if behind != Counted():
             print(f"after a stop: {before_keys} {stop!r} {after_keys}: {sent}", file=sys.stderr)
+
+
+def _disarm(panel: PtyPanel) -> None:
+    """Take the drive from a panel that random keys have armed: only one panel commands it."""
+    if panel.armed:
+        panel.type(STOPS[1])
+        _disarmed(panel)
 
 
 def _disarmed(panel: PtyPanel) -> bool:
