@@ -86,7 +86,7 @@ def test_drive_that_does_not_answer_hinders_no_other(file: Path) -> None:
     assert "Drive 5: as its recipe of 3 settings." in done.stdout
 
 
-def test_drive_of_another_family_is_told_where_its_profile_is_named(file: Path) -> None:
+def test_advice_for_a_drive_of_another_family_names_its_recipe(file: Path) -> None:
     with tcp_line("atv71@4", "atv312@5", "--any-settings") as line:
         output = run(3, "compare", file, line, "-d", "4")
     assert "correct the profile in the recipe of this drive" in output

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -280,6 +281,22 @@ def test_other_drive_at_the_address_has_its_own_progress() -> None:
     files.add(progress_file(DriveSession(line, 2, profile, identity("A")), LINE))
     assert len(files) == 3
     assert len({file.parent for file in files}) == 1
+
+
+def test_start_up_that_begins_again_keeps_its_results_in_another_file() -> None:
+    first, beside = begun(), begun()
+    first.skip("not needed")
+    time.sleep(0.002)  # a start-up is known by its begin, in ms
+    first.begin_again()
+    assert first.counts()["skipped"] == 0
+    file = progress_file(first.session, LINE)
+    assert not file.exists()
+    past = json.loads(file.with_suffix(".past").read_text("utf-8"))
+    assert past["steps"][first.step.step]["text"] == "not needed"
+    first.skip("of the next drive")
+    beside.skip("of the first drive")  # of a panel that does not know of the next one
+    assert "NOT SAVED: another program has begun this start-up again." in beside.trouble
+    assert begun().record.text == "of the next drive"
 
 
 def test_damaged_progress_is_kept_aside() -> None:

@@ -39,6 +39,7 @@ REGISTERED = (
             ("move(1)", "down", "", "Go to the next row."),
             ("section(1)", "tab", "next", "Go to the next step."),
             ("section(-1)", "shift+tab", "", "Go to the previous step."),
+            ("begin_again", "", "", "Begin again, for another drive. Asks first."),
             ("leave", "escape", "back", "Go back."),
         ),
     ),

@@ -24,8 +24,14 @@ from tui.session.startup.judging import (
 from tui.session.startup.start_up import StartUp
 
 from ..dialogs.ask import Ask
+from ..dialogs.confirm import Confirm
 from ..dialogs.now import MotorStates
 from .run_rows import RunRows
+
+BEGINS_AGAIN = (
+    "All steps are open again, for another drive of this reference at this address. The results"
+    " until now are kept in a file, but no report has them any more. No setting is changed."
+)
 
 
 def _filled(text: str) -> str:
@@ -187,6 +193,31 @@ class RowKeys(RunRows):
             return
         when = time.strftime("%Y-%m-%d %H:%M", time.localtime(at))
         self._enter(row, FILE, f"{newest.name}, {when}")
+
+    def action_begin_again(self) -> None:
+        """Ask, and begin the start-up again: another drive of this reference is at the address."""
+        start_up = self.start_up
+        if start_up is None:
+            return
+
+        def reported(sure: bool | None) -> None:
+            if sure and self.start_up is start_up:
+                try:
+                    start_up.begin_again()
+                except OSError as error:
+                    self.app.tell(f"Not begun again: {error.strerror or error}.")
+                self.read_again()
+                self.look()
+
+        requested = Confirm(
+            "Begin the start-up again?",
+            BEGINS_AGAIN,
+            yes="Begin again",
+            no="Cancel",
+            loses=True,
+            now=MotorStates(self.app, [self.session]),
+        )
+        self.app.push_screen(requested, reported)
 
     # Results
 

@@ -304,15 +304,13 @@ def foot_lines(view: StartUpView, width: int) -> list[Text]:
     """Return what is not of one step: trouble with the disk, and what has changed."""
     start_up = view.start_up
     lines = []
-    if start_up.trouble:
-        lines.append(Text(f" {plain(start_up.trouble)}", FAULT))
-    if start_up.notice:
-        lines.append(Text(f" {plain(start_up.notice)}", ALARM))
+    for text, style in ((start_up.trouble, FAULT), (start_up.notice, ALARM)):
+        lines += [Text(f" {line}", style) for line in wrapped(plain(text), width - 1, 2) if text]
     if start_up.changes.texts:
         count = len(start_up.changes.texts)
         text = f" Changed while nothing was read, {count}: {', '.join(start_up.changes.texts)}"
         lines.append(Text(cut_at_word(text, width).rstrip(), ALARM))
     elif start_up.resumed:
         begun = start_up.progress.begun[:16].replace("T", " ")
-        lines.append(Text(f" Begun {begun}. Leave at any step; B continues there.", FAINT))
+        lines.append(Text(f" Begun {begun}. For another drive: Ctrl+P, then type begin.", FAINT))
     return [rule("", width), *lines] if lines else []

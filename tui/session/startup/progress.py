@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import errno
 import hashlib
 import re
-from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
@@ -17,6 +17,7 @@ from ..paths import state_folder
 from ..stored import store_json, stored_json
 
 PROGRESS_FOLDER = "startup"
+BEGUN_ELSEWHERE = "another program has begun this start-up again"
 StepState = Literal["open", "done", "skipped", "deficient"]
 
 
@@ -87,26 +88,27 @@ def read_progress(file: Path) -> StartUpProgress | None:
     return found if found.begun else None
 
 
-def set_damaged_aside(file: Path) -> Path | None:
-    """Rename a file that cannot be used, so that it is not overwritten; None if there is none.
-
-    Raises OSError.
-    """
+def set_aside(file: Path, suffix: str) -> Path | None:
+    """Rename a file, so that it is not overwritten; None if there is none. Raises OSError."""
     if not file.exists():
         return None
-    aside = file.with_suffix(".damaged")
+    aside = file.with_suffix(suffix)
     for number in range(2, 100):
         if not aside.exists():
             break
-        aside = file.with_suffix(f".damaged{number}")
+        aside = file.with_suffix(f"{suffix}{number}")
     return file.rename(aside)
 
 
 def save_progress(file: Path, progress: StartUpProgress) -> None:
-    """Write the progress; keep newer results of another program. Raises OSError."""
-    with suppress(OSError):
-        if (other := read_progress(file)) is not None and other.begun == progress.begun:
-            for name, theirs in other.steps.items():
-                if theirs.time > progress.record(name).time:
-                    progress.steps[name] = theirs
+    """Write the progress; keep newer results of another program.
+
+    Raises OSError, also if another program has begun the start-up again.
+    """
+    if (other := read_progress(file)) is not None:
+        if datetime.fromisoformat(other.begun) > datetime.fromisoformat(progress.begun):
+            raise OSError(errno.EEXIST, BEGUN_ELSEWHERE)
+        for name, theirs in other.steps.items() if other.begun == progress.begun else ():
+            if theirs.time > progress.record(name).time:
+                progress.steps[name] = theirs
     store_json(file, msgspec.to_builtins(progress))

@@ -17,12 +17,13 @@ from .progress import (
     progress_file,
     read_progress,
     save_progress,
-    set_damaged_aside,
+    set_aside,
 )
 from .steps import GuideStep
 
 NOT_SAVED = "NOT SAVED: {error}. Results are kept while the panel runs."
 DAMAGED = "The stored progress was damaged. It was kept as {name}; this start-up begins again."
+BEGUN_AGAIN = "Begun again. The former results are kept as {name}."
 DEFICIENCY_STAYS = "A deficiency stays open until it is tested again. Use the row 'Tested again'."
 MOST_LOST = 1e9
 
@@ -53,11 +54,21 @@ class StartUp:
         found = read_progress(self._file)
         if found is None:
             try:
-                if (aside := set_damaged_aside(self._file)) is not None:
+                if (aside := set_aside(self._file, ".damaged")) is not None:
                     self.notice = DAMAGED.format(name=aside.name)
             except OSError as error:
                 self.trouble = NOT_SAVED.format(error=error.strerror or error)
         return found
+
+    def begin_again(self) -> None:
+        """Begin the same steps for another drive; keep the results so far. Raises OSError."""
+        aside = set_aside(self._file, ".past")
+        if aside is not None:
+            self.notice = BEGUN_AGAIN.format(name=aside.name)
+        own = self.progress.guide
+        self.progress = self._new()
+        self.progress.guide, self.row, self.resumed = own, 0, False
+        self.changes = SettingChanges(self.session)
 
     def _new(self) -> StartUpProgress:
         identity = self.session.known_identity
