@@ -338,8 +338,9 @@ def _way_to_profile(reported: str | None, target: Target) -> str:
         return "Name the profile of that drive."
     context = click.get_current_context(silent=True)
     source = None if context is None else context.get_parameter_source("profile_id")
-    named = source is click.core.ParameterSource.DEFAULT_MAP  # by the name of the line
-    return f"Name -p {reported}, or {'correct the settings file' if named else 'leave -p away'}."
+    if source is click.core.ParameterSource.DEFAULT_MAP:  # the name of the line has it
+        return f"Name -p {reported}, or correct the settings file."
+    return f"Name -p {reported}, or leave -p away."
 
 
 def _believe_the_person(session: DriveSession, target: Target) -> None:

@@ -305,7 +305,7 @@ def foot_lines(view: StartUpView, width: int) -> list[Text]:
     start_up = view.start_up
     lines = []
     for text, style in ((start_up.trouble, FAULT), (start_up.notice, ALARM)):
-        lines += [Text(f" {line}", style) for line in wrapped(plain(text), width - 1, 2) if text]
+        lines += [Text(line, style) for line in wrapped(plain(text), width, 2)]
     if start_up.changes.texts:
         count = len(start_up.changes.texts)
         text = f" Changed while nothing was read, {count}: {', '.join(start_up.changes.texts)}"
