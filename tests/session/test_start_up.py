@@ -32,7 +32,7 @@ from tui.session.startup.judging import (
 )
 from tui.session.startup.lines import start_up_lines
 from tui.session.startup.progress import progress_file, read_progress
-from tui.session.startup.start_up import DEFICIENCY_STAYS, StartUp, open_start_up
+from tui.session.startup.start_up import DEFICIENCY_STAYS, StartUp, begin_again, open_start_up
 from tui.session.startup.steps import GuideField
 
 LINE = "sim:atv71@1"
@@ -287,7 +287,7 @@ def test_start_up_that_begins_again_keeps_its_results_in_another_file() -> None:
     first, beside = begun(), begun()
     first.skip("not needed")
     time.sleep(0.002)  # a start-up is known by its begin, in ms
-    first.begin_again()
+    first = begin_again(first, LINE)
     assert first.counts()["skipped"] == 0
     file = progress_file(first.session, LINE)
     assert not file.exists()

@@ -21,7 +21,7 @@ from tui.session.startup.judging import (
     plate_fault,
     plate_raw,
 )
-from tui.session.startup.start_up import StartUp
+from tui.session.startup.start_up import StartUp, begin_again
 
 from ..dialogs.ask import Ask
 from ..dialogs.confirm import Confirm
@@ -203,7 +203,7 @@ class RowKeys(RunRows):
         def reported(sure: bool | None) -> None:
             if sure and self.start_up is start_up:
                 try:
-                    start_up.begin_again()
+                    self.console.start_up = begin_again(start_up, self.app.line_text)
                 except OSError as error:
                     self.app.tell(f"Not begun again: {error.strerror or error}.")
                 self.read_again()

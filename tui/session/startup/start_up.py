@@ -60,16 +60,6 @@ class StartUp:
                 self.trouble = NOT_SAVED.format(error=error.strerror or error)
         return found
 
-    def begin_again(self) -> None:
-        """Begin the same steps for another drive; keep the results so far. Raises OSError."""
-        aside = set_aside(self._file, ".past")
-        if aside is not None:
-            self.notice = BEGUN_AGAIN.format(name=aside.name)
-        own = self.progress.guide
-        self.progress = self._new()
-        self.progress.guide, self.row, self.resumed = own, 0, False
-        self.changes = SettingChanges(self.session)
-
     def _new(self) -> StartUpProgress:
         identity = self.session.known_identity
         drive = identity.reference or self.session.profile.name
@@ -229,3 +219,15 @@ def open_start_up(session: DriveSession, line: str, own: Path | None = None) -> 
     if path is not None:
         return StartUp(session, line, read_guide(path, session.profile), str(path))
     return StartUp(session, line, find_guide(session.profile))
+
+
+def begin_again(former: StartUp, line: str) -> StartUp:
+    """Begin the same steps for another drive on a line as typed; keep the results so far.
+
+    Raises OSError.
+    """
+    aside = set_aside(progress_file(former.session, line), ".past")
+    again = StartUp(former.session, line, former.guide, former.progress.guide)
+    if aside is not None:
+        again.notice = BEGUN_AGAIN.format(name=aside.name)
+    return again
