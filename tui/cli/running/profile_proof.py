@@ -27,11 +27,13 @@ ONLY_SIMULATED = (
 def check_files(files: list[Path], as_json: bool) -> None:
     """Report every fault of every file; status 2 if there is one."""
     from tui.drive.profile import library
+    from tui.drive.profile.register_identity import shared_identification
 
     from ..documents.other_documents import CheckDocument
     from ..shared.output import print_json
 
     found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
+    found |= {path: shared_identification(path) for path, faults in found.items() if not faults}
     if as_json:
         print_json([CheckDocument(file=str(path), faults=some) for path, some in found.items()])
     else:

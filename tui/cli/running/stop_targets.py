@@ -190,7 +190,7 @@ async def found_at(
     past = line.state.status is LineStatus.LOST or device in line.facts.paused
     try:
         priority = Priority.STOP if past else patience
-        identity = await identify_drive(line, device, priority=priority)
+        identity = await identify_drive(line, device, priority=priority, brief=True)
     except NoAnswer:
         return None
     except LineError as error:

@@ -54,6 +54,8 @@ class RequestPrefixes(NamedTuple):
     """Prefixes of the family's references."""
     functions: frozenset[int] = frozenset()
     version_digits: str = "as-told"
+    registers: bool = False
+    """True if registers identify them."""
 
 
 def file_head(path: Path, own: bool, packaged: Path) -> ProfileFileHead:
@@ -143,6 +145,7 @@ def _requested(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -
         tuple(p for p in prefixes if isinstance(p, str)) if isinstance(prefixes, list) else (),
         frozenset(code for code in codes if isinstance(code, int)),
         str(named.get("version_digits", "")) if isinstance(named, dict) else "",
+        bool(named.get("registers")) if isinstance(named, dict) else False,
     )
 
 

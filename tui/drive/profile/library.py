@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ProfileError, UnknownProfile
-from .heads import file_head, quick_head, request_prefixes
+from .heads import RequestPrefixes, file_head, quick_head, request_prefixes
 
 if TYPE_CHECKING:
     from .profile import Profile
@@ -231,20 +231,37 @@ def faults_of(path: Path) -> list[str]:
 
 def matching_profiles(reference: str) -> list[str]:
     """Return the ids of profiles whose reference prefixes fit a reported reference, best first."""
+    return [profile_id for _, profile_id in _fits(reference)]
+
+
+def identified_profile(reference: str) -> str | None:
+    """Return the profile that fits a reported reference best; None if several fit equally."""
+    (best, found), (second, _), *_ = *_fits(reference), (0, None), (0, None)
+    return found if best > second else None
+
+
+def _fits(reference: str) -> list[tuple[int, str]]:
+    """Return the length of the fitting prefix, and the id, of each profile that fits, best
+    first."""
     wanted = reference.strip().upper()
     fits: list[tuple[int, str]] = []
     for listing in (*listings(), *public_listings()):
-        folder = packaged_folder() if listing.own else listing.path.parent
-        prefixes = request_prefixes(listing.path, listing.own, folder).prefixes
+        prefixes = identification_of(listing).prefixes
         longest = max((len(p) for p in prefixes if wanted.startswith(p.upper())), default=0)
         if longest:
             fits.append((longest, listing.id))
-    return [profile_id for _, profile_id in sorted(fits, reverse=True)]
+    return sorted(fits, reverse=True)
+
+
+def identification_of(listing: Listing) -> RequestPrefixes:
+    """Return how drives of a listed family are identified, without decoding the file."""
+    folder = packaged_folder() if listing.own else listing.path.parent
+    return request_prefixes(listing.path, listing.own, folder)
 
 
 def mentions_function(listing: Listing, code: int) -> bool:
     """Return True if a profile declares a Modbus function, without decoding the file."""
-    return code in request_prefixes(listing.path, listing.own, packaged_folder()).functions
+    return code in identification_of(listing).functions
 
 
 @lru_cache(maxsize=64)
@@ -253,7 +270,7 @@ def version_shown(profile_id: str | None, version: str) -> str:
     listing = next((item for item in listings() if item.id == profile_id), None)
     if listing is None or len(version) != 4 or not version.isdecimal():
         return version
-    reported = request_prefixes(listing.path, listing.own, packaged_folder())
+    reported = identification_of(listing)
     if reported.version_digits != "two-and-two":
         return version
     return f"{int(version[:2])}.{int(version[2:])}"

@@ -13,6 +13,11 @@ from ..plain import escaped_toml
 _HEAD = re.compile(r"^\[profile\][^\n]*\n.*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
 _ID = re.compile(r"""^id[ \t]*=[ \t]*(?:"[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
 _PREFIXES = re.compile(r"^reference_prefixes[ \t]*=[ \t]*\[[^\]]*\]", re.MULTILINE)
+_REGISTERS = re.compile(
+    r"^registers[ \t]*=[ \t]*\[(?:[^\[\]]|\[[^\[\]]*\])*\][^\n]*\n"
+    r"|^\[\[identification\.registers\]\][^\n]*\n(?:[^\[\n][^\n]*\n|\n)*",
+    re.MULTILINE,
+)
 _DEMO = re.compile(r"^(?:demo_hz|rows_from|without)\b[^\n]*\n", re.MULTILINE)
 _ROWS = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
 _OTHER_ROWS = r"^\[\[{0}[.\]].*?(?=^\[(?!\[{0}[.\]])|\Z)"
@@ -27,7 +32,7 @@ def new_profile_text(
     new_id: str,
     rows: Mapping[str, Iterable[Mapping[str, Any]]] | None = None,
 ) -> str:
-    """Return a profile's text with another id, and without prefixes that recognize drives.
+    """Return a profile's text with another id, and without what recognizes drives.
 
     `rows` are all rows of its tables that share some, parameters last, because a profile of the
     user contains them itself. Raises ProfileError for an invalid id, and if the head cannot be
@@ -50,6 +55,7 @@ def new_profile_text(
             text = re.sub(_OTHER_ROWS.format(table), "", text, flags=re.MULTILINE | re.DOTALL)
         parts = [row_as_toml(table, row) for table, own in rows.items() for row in own]
         text = f"{text}\n" + "\n".join(parts)
+    text = _REGISTERS.sub("", text)
     return _PREFIXES.sub(
         '# beginnings of the reference that the drive reports, such as ["NEW12"]\n'
         "reference_prefixes = []",

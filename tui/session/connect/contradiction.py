@@ -11,6 +11,7 @@ from tui.drive.profile.profile import Profile
 
 from .identify import DriveIdentity, confirmed_identity
 from .identifying import Askable, ask_identification, intact
+from .register_reads import RegisterReads, unexpected_register
 
 BRIEFLY = 0.4
 """Seconds within which a drive that has the function answers, although its family lacks it."""
@@ -52,7 +53,11 @@ async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdenti
         )
     except NoAnswer:
         return None
-    return await confirmed_identity(device, answer) if answer is not None else None
+    if answer is not None:
+        return await confirmed_identity(device, answer)
+    reads = RegisterReads(line, device, Priority.OPERATOR_READ, None)
+    denied = await unexpected_register(reads, profile)
+    return DriveIdentity(device, "", "", "", "", None, (), denied) if denied else None
 
 
 async def read_status(line: Askable, device: int, profile: Profile, priority: Priority) -> bool:
@@ -68,6 +73,10 @@ _OTHER_FAMILY = (
     "Device {device} says it is {reference}, {family}: the profile {profile} does not fit it."
 )
 _UNKNOWN_KIND = "Device {device} says it is {reference}: the profile {profile} does not fit it."
+_OTHER_REGISTERS = (
+    "Device {device} has the registers of {family}: the profile {profile} does not fit it."
+)
+_DENIED = "Device {device} has {denied}: the profile {profile} does not fit it."
 
 
 def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
@@ -76,15 +85,25 @@ def contradiction(identity: DriveIdentity | None, profile: Profile) -> str:
     No contradiction: a drive without names, and one of a kind that no profile knows if the profile
     names no kinds or its kinds begin alike.
     """
-    if identity is None or not identity.reference or profile.id in identity.candidates:
+    if identity is None or profile.id in identity.candidates:
         return ""
-    if not identity.candidates and _may_be(identity.reference, profile):
+    if identity.reference:
+        differs = bool(identity.candidates) or not _may_be(identity.reference, profile)
+    else:
+        differs = bool(identity.denied) or identity.profile not in (None, profile.id)
+    if not differs:
         return ""
     names = {listing.id: listing.name for listing in library.listings()}
     family = names.get(identity.candidates[0], "") if identity.candidates else ""
     text = _OTHER_FAMILY if family else _UNKNOWN_KIND
+    if not identity.reference:
+        text = _DENIED if identity.denied else _OTHER_REGISTERS
     return text.format(
-        device=identity.device, reference=identity.reference, family=family, profile=profile.name
+        device=identity.device,
+        reference=identity.reference,
+        family=family,
+        profile=profile.name,
+        denied=identity.denied,
     )
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import dataclass
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from functools import partial
 
 from tui.bus.api import IdentificationObjects, Priority
@@ -22,6 +23,7 @@ from tui.drive.plain import plain
 from tui.drive.profile import library
 
 from .identifying import TRIES, Askable, NotIdentified, ask_identification, intact
+from .register_reads import RegisterReads, families_by_registers
 
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
 
@@ -39,6 +41,8 @@ class DriveIdentity:
     """Id of the profile that fits best, or None."""
     candidates: tuple[str, ...]
     """Ids of all profiles that may fit, best first."""
+    denied: str = ""
+    """Identifying register of the named profile that has another value; empty if none has."""
 
     @property
     def text(self) -> str:
@@ -59,19 +63,55 @@ class ScanResult:
     identity: DriveIdentity | None
     error: str = ""
     by: str = ""
-    """Source of the identity: `function 43`, `function 17`, a read; empty if none."""
+    """Source of the identity: `function 43`, `function 17`, a read, registers; empty if none."""
 
 
 async def identify_drive(
-    line: Askable, device: int, *, priority: Priority = Priority.OPERATOR_READ
+    line: Askable,
+    device: int,
+    *,
+    priority: Priority = Priority.OPERATOR_READ,
+    brief: bool = False,
 ) -> DriveIdentity:
-    """Request a drive's identity by function 43.
+    """Request a drive's identity by function 43; unless `brief`, also by 17 and by registers.
 
     A drive that refuses the function is present, but nameless. A drive that does not answer, or
     whose limits exclude function 43, gets a read of the status word of each family without that
-    function. Raises NoAnswer if nothing answers, ChecksumFault or WrongReply if lost or damaged
-    frames leave it open, and the line's other errors.
+    function. Functions and registers that no profile names are not requested. Raises NoAnswer if
+    nothing answers, ChecksumFault or WrongReply if lost or damaged frames leave it open, and the
+    line's other errors.
     """
+    identity = await _by_function_43(line, device, priority)
+    if brief or identity.profile is not None:
+        return identity
+    if not identity.reference and await asyncio.to_thread(_any_reports_its_id):
+        with suppress(DeviceException, RequestRefused, NoAnswer):
+            answer = await line.identify(device, priority=priority, function=REPORT_ID)
+            if answer.objects.get(REFERENCE):
+                identity = await confirmed_identity(device, answer)
+    return await _by_registers(line, identity, priority, None)
+
+
+def _any_reports_its_id() -> bool:
+    """Return True if a profile describes drives that support function 17."""
+    listed = (*library.listings(), *library.public_listings())
+    return any(library.mentions_function(listing, REPORT_ID) for listing in listed)
+
+
+async def _by_registers(
+    line: Askable, identity: DriveIdentity, priority: Priority, within: float | None
+) -> DriveIdentity:
+    """Return an identity with the profile whose identifying registers fit, unless it has one."""
+    if identity.profile is not None or (identity.reference and identity.candidates):
+        return identity
+    reads = RegisterReads(line, identity.device, priority, within)
+    found = await families_by_registers(reads, identity.reference)
+    if not found:
+        return identity
+    return replace(identity, profile=found[0] if len(found) == 1 else None, candidates=found)
+
+
+async def _by_function_43(line: Askable, device: int, priority: Priority) -> DriveIdentity:
     # a person's request is repeated once: a lost reply does not mean an absent drive
     there = _Presence(damaged=True)
     left = TRIES
@@ -143,12 +183,16 @@ async def _identified(
                 tries=TRIES if function == IDENTIFY else 1, healthy=bool(there.families),
             )  # fmt: skip
         if answer is not None and (answer.objects.get(REFERENCE) or function == IDENTIFY):
-            return ScanResult(device, await confirmed_identity(device, answer), by=how)
-    # a drive without these functions is not absent: its last answer counts
-    if there.families and not await control():
-        raise NotIdentified(device)
-    by = f"read of register {there.register}" if there.families else ""
-    return ScanResult(device, _nameless(device, there.families), by=by)
+            identity, by = await confirmed_identity(device, answer), how
+            break
+    else:
+        # a drive without these functions is not absent: its last answer counts
+        if there.families and not await control():
+            raise NotIdentified(device)
+        identity = _nameless(device, there.families)
+        by = f"read of register {there.register}" if there.families else ""
+    known = await _by_registers(line, identity, priority, patience)
+    return ScanResult(device, known, by=by if known == identity else "registers")
 
 
 @dataclass(frozen=True, slots=True)
@@ -223,7 +267,7 @@ def identity_from(device: int, answer: IdentificationObjects) -> DriveIdentity:
         reference=reference,
         version=texts.get(VERSION, ""),
         name=texts.get(NAME, ""),
-        profile=candidates[0] if candidates else None,
+        profile=library.identified_profile(reference) if reference else None,
         candidates=candidates,
     )
 

@@ -155,7 +155,7 @@ class Search:
             raise
         except LineError:
             return False
-        if result.identity is None or not result.identity.reference:
+        if result.identity is None or not (result.identity.reference or result.identity.profile):
             return False
         self.answered = frozenset(self.devices)
         await found(result)
@@ -268,11 +268,14 @@ class _Considerate:
         count: int = 1,
         *,
         priority: Priority,
+        function: int = 3,
         within: float | None = None,
     ) -> Reply:
         """As the line's own."""
         try:
-            return await self._line.read(device, address, count, priority=priority, within=within)
+            return await self._line.read(
+                device, address, count, priority=priority, function=function, within=within
+            )
         except NoAnswer:
             await self._rest(priority, within)
             raise

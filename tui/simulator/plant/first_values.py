@@ -55,6 +55,8 @@ def first_values(
     `line_first` are raw values by code, in any case, of a drive set up for its line.
     """
     chosen = {code.casefold(): raw for code, raw in line_first.items()}
+    for row in profile.data.identification.registers:
+        chosen.setdefault(row.parameter.casefold(), row.values[0])
     plate = _plate(rating)
     values: dict[str, int] = {}
     for parameter in profile.parameters:

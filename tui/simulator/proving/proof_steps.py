@@ -12,7 +12,15 @@ from tui.drive.orders import STOP_ORDERS, optional_bits
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.profile_frame import READING, frame_contents
 from tui.drive.profile.rules.charts import RUN_ORDERS
-from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, ProfileFrame, ReferenceWay
+from tui.drive.profile.schema import (
+    Chart,
+    IdentityRegister,
+    Order,
+    OrderId,
+    Parameter,
+    ProfileFrame,
+    ReferenceWay,
+)
 from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, is_enumeration, raw_range, type_range, word_count
@@ -189,9 +197,14 @@ def _near(bench: ProofBench, hz: float) -> bool:
     return abs(bench.hz - hz) < HZ_TOLERANCE
 
 
+REPORT_ID, REPORT_TEXT = 17, 4
+"""The function, and the place of the text in its reply."""
+
+
 def prove_profile(profile: Profile) -> Iterator[ProofStep]:
     """Test a checked profile on the drive that is simulated from it, step by step."""
     yield from _reads(profile)
+    yield from _identity(profile)
     yield from _frames(profile)
     yield from command_steps(profile)
     yield from _limits(profile)
@@ -216,6 +229,35 @@ def _reads(profile: Profile) -> Iterator[ProofStep]:
                     yield ("parameters", index), f"{parameter.code} cannot be read: {error}"
 
     yield from _each(("parameters",), "every parameter is read", faults())
+
+
+def _identity(profile: Profile) -> Iterator[ProofStep]:
+    """Test that the drive reports the text and the registers by which scans recognize it."""
+    own = profile.data.identification
+    at: TomlPath = ("identification",)
+    for place, row in enumerate(own.registers):
+        yield proof_step(
+            (*at, "registers", place),
+            f"register {row.parameter} identifies the drive",
+            partial(_identifies, profile, row),
+        )
+    if own.reference_prefixes and profile.function(REPORT_ID) is not None:
+        step = partial(_reports_its_id, profile)
+        yield proof_step((*at, "reference_prefixes"), "function 17 identifies the drive", step)
+
+
+def _identifies(profile: Profile, row: IdentityRegister) -> None:
+    raw = ProofBench(profile, None).read(profile[row.parameter])
+    if raw not in row.values:
+        raise Unproved(f"{row.parameter} is {raw}")
+
+
+def _reports_its_id(profile: Profile) -> None:
+    reply = ProofBench(profile, None).ask(bytes([REPORT_ID]))
+    text = reply[REPORT_TEXT:].decode("ascii", "replace").upper()
+    prefixes = profile.data.identification.reference_prefixes
+    if not any(text.startswith(prefix.upper()) for prefix in prefixes):
+        raise Unproved(f"it reports {text!r}")
 
 
 def _limits(profile: Profile) -> Iterator[ProofStep]:

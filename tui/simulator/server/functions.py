@@ -15,6 +15,7 @@ from .access import Refused, past_limit
 IDENTIFICATION_TYPE = 14
 COUNTER_RESET, CHECKSUM_COUNT, FRAME_COUNT, ECHO = 10, 12, 14, 0
 NAME_LENGTH = 16
+REFERENCE_OBJECT, SERVER_ID, RUNS = 1, 1, 0xFF
 
 
 class Words(Protocol):
@@ -173,12 +174,20 @@ def _identify(server: Server, function: Function, body: bytes) -> bytes:
     return head + bytes([len(chosen)]) + objects
 
 
+def _report_id(server: Server, function: Function, body: bytes) -> bytes:
+    """Execute function 17: an id, the sign that it runs, and the reference as text."""
+    if body or not (text := server.identity.get(REFERENCE_OBJECT, b"")):
+        raise _wrong_shape(server)
+    return bytes([2 + len(text), SERVER_ID, RUNS]) + text
+
+
 _HANDLERS: Mapping[int, Callable[[Server, Function, bytes], bytes]] = {
     3: _read,
     4: _read,
     6: _write_one,
     8: _diagnose,
     16: _write_many,
+    17: _report_id,
     23: _read_write,
     43: _identify,
 }

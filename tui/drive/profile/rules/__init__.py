@@ -6,7 +6,17 @@ from collections.abc import Callable, Iterator
 
 from ..schema import ProfileData
 from ..toml_lines import TomlPath
-from . import charts, commands, limits, meanings, names, parameters, registers, signal_paths
+from . import (
+    charts,
+    commands,
+    identification,
+    limits,
+    meanings,
+    names,
+    parameters,
+    registers,
+    signal_paths,
+)
 
 Finding = tuple[TomlPath, str]
 """Place of an error, and the error."""
@@ -20,6 +30,7 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     *commands.COMMAND_RULES,
     *meanings.MEANING_RULES,
     *signal_paths.PATH_RULES,
+    *identification.IDENTIFICATION_RULES,
 )
 
 __all__ = ["RULES", "Finding"]

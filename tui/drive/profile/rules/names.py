@@ -169,6 +169,8 @@ def _table_names(data: ProfileData) -> Iterator[NamedPlace]:
             yield ("control_sources", index, "settings", place), item.parameter
     yield ("identification", "model_parameter"), data.identification.model_parameter
     yield ("identification", "class_parameter"), data.identification.class_parameter
+    for place, register in enumerate(data.identification.registers):
+        yield ("identification", "registers", place, "parameter"), register.parameter
     for place, server in enumerate(data.addresses.servers):
         yield ("addresses", "servers", place, "parameter"), server.parameter
 

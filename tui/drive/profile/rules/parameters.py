@@ -68,6 +68,7 @@ UNIQUE_ROWS = (
     (("references",), "parameter", "reference {} occurs twice."),
     (("monitoring", "values"), "parameter", "{} is monitored twice."),
     (("identification", "objects"), "id", "object {} occurs twice."),
+    (("identification", "registers"), "parameter", "register {} occurs twice."),
     (("link", "settings"), "parameter", "setting {} occurs twice."),
     (("communication_fault", "reactions"), "raw", "reaction {} occurs twice."),
     (("faults", "codes"), "raw", "fault {} occurs twice; a raw code means one fault."),

@@ -68,11 +68,22 @@ class Model(Table, frozen=True, kw_only=True):
     class_b: bool = False
 
 
+class IdentityRegister(Table, frozen=True, kw_only=True):
+    """A parameter that shows the family of a drive."""
+
+    parameter: str
+    values: Annotated[list[int], Meta(min_length=1)]
+    """Raw values that only drives of this family have."""
+
+
 class Identification(Table, frozen=True, kw_only=True):
     """Recognition of a drive of this family."""
 
     reference_prefixes: list[str] = []
-    """Beginnings of object 1 (reference) that belong to this family."""
+    """Beginnings of object 1 (reference) that belong to this family; of the text of function 17 if
+    the drive does not support function 43."""
+    registers: list[IdentityRegister] = []
+    """Registers that show the family if the drive does not report its reference; all must fit."""
     objects: list[IdentificationObject] = []
     version_digits: Literal["as-told", "two-and-two"] = "as-told"
     """`two-and-two` if 0201 means version 2.1."""

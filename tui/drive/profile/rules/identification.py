@@ -1,0 +1,78 @@
+"""Rules for the identification of a drive: what a family shows that no other drive shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tui.drive.values import type_range
+
+from ..schema import IdentityRegister, Parameter, ProfileData
+from ..toml_lines import TomlPath
+
+REFERENCE, REPORT_ID, IDENTIFY = 1, 17, 43
+COMMON_BELOW = 256
+"""Values below it are common: one alone identifies no family."""
+SHORTEST_TEXT = 3
+"""Fewest characters of a text that function 17 is searched for."""
+
+
+def identity_registers(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield registers that other drives may have with the same values."""
+    rows = data.identification.registers
+    known = {parameter.code: parameter for parameter in data.parameters}
+    for place, row in enumerate(rows):
+        at: TomlPath = ("identification", "registers", place)
+        parameter = known.get(row.parameter)
+        if parameter is None:
+            continue  # reported as a missing parameter
+        if parameter.access != "r":
+            yield at, f"register {row.parameter}: it can be written. Its access must be r."
+        yield from ((at, f"register {row.parameter}: {text}") for text in _bad(row, parameter))
+    if len(rows) == 1 and rows[0].parameter in known and min(rows[0].values) < COMMON_BELOW:
+        yield (
+            ("identification", "registers"),
+            f"identification: values below {COMMON_BELOW} are common. Add a second register.",
+        )
+
+
+def _bad(row: IdentityRegister, parameter: Parameter) -> Iterator[str]:
+    low, high = type_range(parameter)
+    if parameter.type == "float32":
+        yield "a float32 has no exact value."
+        return
+    for raw in row.values:
+        if not low <= raw <= high:
+            yield f"{raw} does not fit {parameter.type}: {low} to {high}."
+        elif raw in (0, high, -1):
+            yield f"{raw} is also the value of registers that a drive does not have."
+
+
+def identity_texts(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield texts by which the drive, real or simulated, would not be recognized."""
+    own = data.identification
+    prefixes = own.reference_prefixes
+    for place, prefix in enumerate(prefixes):
+        if len(prefix.strip()) < SHORTEST_TEXT:
+            yield (
+                ("identification", "reference_prefixes", place),
+                f"identification: the prefix {prefix!r} is too short: 3 characters at least.",
+            )
+    functions = {function.code for function in data.functions}
+    example = next((item.example for item in own.objects if item.id == REFERENCE), "")
+    if prefixes and example and not example.upper().startswith(_upper(prefixes)):
+        yield (
+            ("identification", "objects"),
+            f"identification: the reference {example!r} begins with none of reference_prefixes.",
+        )
+    if REPORT_ID in functions and IDENTIFY not in functions and len(example) < SHORTEST_TEXT:
+        yield (
+            ("identification", "objects"),
+            "identification: function 17 has no text. Add it as the example of object 1.",
+        )
+
+
+def _upper(prefixes: list[str]) -> tuple[str, ...]:
+    return tuple(prefix.strip().upper() for prefix in prefixes)
+
+
+IDENTIFICATION_RULES = (identity_registers, identity_texts)

@@ -1,0 +1,101 @@
+"""Identification of a drive by the values of its registers; only reads."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+
+from tui.bus.api import Priority
+from tui.bus.errors import ChecksumFault, DeviceException, NoAnswer, RequestRefused, WrongReply
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.register_identity import RegisterIdentity, register_identities
+from tui.drive.profile.schema import Parameter
+from tui.drive.words import from_words, word_count
+
+from .identifying import Askable
+
+REGISTER_TRIES = 2
+"""Number of requests for one register if replies are lost or damaged."""
+
+
+class RegisterReads:
+    """Reads of one device; each register is read once."""
+
+    def __init__(
+        self, line: Askable, device: int, priority: Priority, within: float | None
+    ) -> None:
+        self._line, self._device = line, device
+        self._priority, self._within = priority, within
+        self._read: dict[tuple[int, int, int], Sequence[int] | None] = {}
+
+    async def raw(self, parameter: Parameter) -> int | None:
+        """Return the raw value of a parameter; None if the drive does not have it.
+
+        Raises ChecksumFault or WrongReply if no reply was intact.
+        """
+        words = await self.words(parameter.function, parameter.address, word_count(parameter))
+        return None if words is None else from_words(parameter, words)
+
+    async def words(self, function: int, address: int, count: int) -> Sequence[int] | None:
+        """Return registers; None without an answer. Raises ChecksumFault, WrongReply."""
+        place = function, address, count
+        if place not in self._read:
+            self._read[place] = await self._ask(*place)
+        return self._read[place]
+
+    async def _ask(self, function: int, address: int, count: int) -> Sequence[int] | None:
+        unclear: ChecksumFault | WrongReply | None = None
+        for _ in range(REGISTER_TRIES):
+            try:
+                reply = await self._line.read(
+                    self._device, address, count,
+                    priority=self._priority, function=function, within=self._within,
+                )  # fmt: skip
+            except (DeviceException, RequestRefused):
+                return None
+            except NoAnswer:
+                continue
+            except (ChecksumFault, WrongReply) as error:
+                unclear = error
+            else:
+                return reply.words
+        if unclear is not None:
+            raise unclear
+        return None
+
+
+async def families_by_registers(reads: RegisterReads, reference: str) -> tuple[str, ...]:
+    """Return the profiles whose identifying registers a drive has, with all of their values.
+
+    A family with prefixes that do not fit the drive's `reference` is not among them. If a drive
+    of another family may have these values, and has its status word, that family is added.
+    """
+    found: list[str] = []
+    for family in await asyncio.to_thread(register_identities):
+        other = reference and family.prefixes
+        if not other and await _fits(reads, family):
+            found.append(family.profile)
+            for address, ids in family.others.items():
+                if await reads.words(3, address, 1) is not None:
+                    found += ids
+    return tuple(dict.fromkeys(found))
+
+
+async def _fits(reads: RegisterReads, family: RegisterIdentity) -> bool:
+    for parameter, values in family.rows:
+        if await reads.raw(parameter) not in values:
+            return False
+    return True
+
+
+async def unexpected_register(reads: RegisterReads, profile: Profile) -> str:
+    """Return the identifying register of a profile that has another value; empty if none has.
+
+    Registers that the drive does not have are ignored.
+    """
+    for row in profile.data.identification.registers:
+        parameter = profile[row.parameter]
+        raw = await reads.raw(parameter)
+        if raw is not None and raw not in row.values:
+            return f"{parameter.code} ({parameter.number}) {raw}"
+    return ""
