@@ -50,8 +50,8 @@ DEFECTS = (
     Defect(
         "hidden-state-not-told",
         "tui/drive/profile/rules/charts.py",
-        "if not before.mask & ~state.mask and",
-        "if before.mask & ~state.mask and",
+        "same = not before.mask & ~state.mask and",
+        "same = before.mask & ~state.mask and",
         "A tripped drive with the user's own profile is shown in an earlier state.",
         ("tests/drive/test_profile_check.py",),
     ),

@@ -247,7 +247,7 @@ DEFECTS = (
     Defect(
         "stop-word-of-another-state",
         "tui/drive/foreign_write.py",
-        "if status is None or state_of(chart, status).id not in order.states:",
+        "if order.states and state_of(chart, raws).id not in order.states:",
         "if False:",
         "A halt word passes as a stop although the drive interprets it differently.",
         (WORDS,),

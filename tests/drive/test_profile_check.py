@@ -89,6 +89,13 @@ def path(
 
 Change = tuple[str, str]
 PLACE = "\n[[enumerations]]"
+
+
+def also(words: str) -> Change:
+    """The change that gives the running state a further word."""
+    return RUNNING, RUNNING.replace(" },", f", also = [{{ {words} }}] }},")
+
+
 FULL_SCALE = 'unit = "{}"\nfull_scale = {{ counts = 20000, parameter = "{}" }}'
 BY_SIGN = """
 [[references]]
@@ -151,6 +158,31 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     "a state in bits that a word of 16 bits lacks": (
         [(RUNNING, RUNNING.replace("0x0002", "0x20002"))],
         "STAT has 16 bits, its mask more",
+        '{ id = "running"',
+    ),
+    "a further word of a state that is the status word": (
+        [also('parameter = "STAT", values = [1]')],
+        "also names STAT. It is for words beside the status word.",
+        '{ id = "running"',
+    ),
+    "a further word of a state that does not exist": (
+        [also('parameter = "STAT9", values = [1]')],
+        "STAT9",
+        '{ id = "running"',
+    ),
+    "a further word of a state that is a measurement": (
+        [also('parameter = "FREQ", values = [1]')],
+        "also names FREQ, which is a measurement",
+        '{ id = "running"',
+    ),
+    "a further word of a state with bits outside its mask": (
+        [also('parameter = "TRIP", mask = 1, values = [2]')],
+        "a value of TRIP has bits outside its mask",
+        '{ id = "running"',
+    ),
+    "a further word of a state without a value": (
+        [also('parameter = "TRIP", mask = 1, values = []')],
+        "or none is given",
         '{ id = "running"',
     ),
     "a bit that a word of 16 bits lacks": (

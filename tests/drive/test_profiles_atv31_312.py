@@ -82,7 +82,7 @@ def test_link_settings_match_the_manual(profile: Profile) -> None:
 def test_states_match_the_manual(profile: Profile, word: int, state: str) -> None:
     chart = profile.chart({})
     assert chart is not None
-    assert state_of(chart, word).id == state
+    assert state_of(chart, {chart.status: word}).id == state
 
 
 def test_ramps_follow_the_increment(profile: Profile) -> None:

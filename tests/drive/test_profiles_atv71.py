@@ -304,7 +304,7 @@ def test_scanner_factory_assignment_matches_the_manual(atv71: Profile) -> None:
     ],
 )
 def test_drivecom_states_match_the_manual(atv71: Profile, word: int, state: str) -> None:
-    assert state_of(chart_of(atv71, "drivecom"), word).id == state
+    assert state_of(chart_of(atv71, "drivecom"), {"ETA": word}).id == state
 
 
 def test_no_drivecom_word_fits_two_states(atv71: Profile) -> None:
@@ -326,7 +326,7 @@ def test_no_drivecom_word_fits_two_states(atv71: Profile) -> None:
     ],
 )
 def test_states_of_the_io_profile_match_the_manual(atv71: Profile, word: int, state: str) -> None:
-    assert state_of(chart_of(atv71, "io"), word).id == state
+    assert state_of(chart_of(atv71, "io"), {"ETA": word}).id == state
 
 
 def test_chart_follows_the_control_profile(atv71: Profile) -> None:

@@ -10,6 +10,7 @@ from click.testing import CliRunner
 
 from tests.mixer import COMMAND, HERTZ, MIXER, installed_mixer
 from tui.cli.main import main
+from tui.drive.chart import read_chart
 from tui.drive.errors import ValueRefused
 from tui.drive.first_stop import blind_stops
 from tui.drive.foreign_write import WordKind, classify_words, half_refusal, starts_by
@@ -20,9 +21,14 @@ from tui.drive.settings.in_force import limits_in_force
 from tui.drive.settings.limits import edit_problems
 from tui.drive.shown import number_of, raw_of_text, shown
 from tui.drive.values import NOT_A_NUMBER, from_words, to_words
+from tui.session.drive import DriveSession
+from tui.session.read.reader import Reader
+from tui.session.record.decoding import HistoryPoint, joined_points
+from tui.session.record.runs import _kind_of
 from tui.simulator import DriveSpec, SimulatedDrive
 from tui.simulator.proving.proof_steps import prove_profile
 
+from .fakes import OneDrive
 from .test_command import bench
 
 ROW = """
@@ -44,6 +50,7 @@ FLOW = (
     ROW.format("FLOW", 302, 302) + 'access = "rw"\nunit = "m/s"\nscale = "0.01"\nmin = -500\n'
     'max = 1000\nfactory = 0\ntype = "float32"\nlow_word_first = false\n'
 )
+WAY = '[[references]]\nparameter = "REF"\nkind = "frequency"\n\n'
 ROWS = TEMP + SLIP + FLOW
 
 
@@ -188,7 +195,7 @@ WIDE_COMMAND = (
 WIDE = 230
 
 
-async def test_command_word_of_32_bits_runs_reverses_and_stops_in_whole_frames() -> None:
+async def test_command_word_of_32_bits_runs_and_stops_in_whole_frames() -> None:
     installed_mixer(HERTZ, "", *WIDE_COMMAND)
     async with bench(MIXER) as made:
         made.commander.run("forward", "20Hz")
@@ -196,19 +203,12 @@ async def test_command_word_of_32_bits_runs_reverses_and_stops_in_whole_frames()
         await made.let_go_until(lambda: made.drive.motor.frequency > 19)
         made.stopper.stop([made.session])
         await made.let_go_until(lambda: made.stopped)
-        await made.arm()
-        made.commander.run("reverse", "20Hz")
-        assert await made.done() == "Run reverse: Running"
-        await made.let_go_until(lambda: made.drive.motor.frequency < -19)
-        made.stopper.stop([made.session])
-        await made.let_go_until(lambda: made.stopped)
         written = [
             frame.data[7:11].hex(" ", 2)
             for frame in made.line.trace
             if frame.direction == "out" and frame.data[1:4] == bytes([16, 0, WIDE])
         ]
-    forward, stop, reverse = "0001 0000", "8000 0001", "0003 0000"
-    assert written == [forward, stop, reverse, stop]
+    assert written == ["0001 0000", "8000 0001"]
 
 
 def test_prepared_and_first_stop_of_32_bits_have_both_words() -> None:
@@ -242,7 +242,82 @@ def test_half_of_a_command_word_of_32_bits_is_no_stop_of_a_client(
 
 
 def test_profile_with_a_command_word_of_32_bits_proves_itself() -> None:
-    way = '[[references]]\nparameter = "REF"\nkind = "frequency"\n\n[[parameters]]\ncode = "STAT"'
-    ways = ('[[parameters]]\ncode = "STAT"', way)
+    ways = ('[[parameters]]\ncode = "STAT"', f'{WAY}[[parameters]]\ncode = "STAT"')
     profile = installed_mixer(HERTZ, "", *WIDE_COMMAND, ways)
     assert {step.title: step.fault for step in prove_profile(profile) if step.fault} == {}
+
+
+TWO_WORDS = (
+    (
+        'kind = "running", mask = 0x0002, value = 0x0002 }',
+        'kind = "running", mask = 0x0002, value = 0x0002,'
+        ' also = [{ parameter = "STAT2", mask = 0x0300, values = [0x0100, 0x0200] }] },\n'
+        '  { id = "held", name = "Held", kind = "stopped", mask = 0x0002, value = 0x0002 }',
+    ),
+    ('states = ["ready", "running"]', 'states = ["ready", "running", "held"]'),
+)
+"""The motor runs if one word says so and another one agrees."""
+STATUS_2 = ROW.format("STAT2", 103, 103) + 'access = "r"\n'
+
+
+@pytest.mark.parametrize(
+    ("raws", "state"),
+    [
+        ({"STAT": 2, "STAT2": 0x100}, "running"),
+        ({"STAT": 2, "STAT2": 0x8200}, "running"),
+        ({"STAT": 2, "STAT2": 0x300}, "held"),
+        ({"STAT": 2}, "unknown"),
+        ({"STAT": 1}, "ready"),
+        ({"STAT2": 0x100}, "unknown"),
+    ],
+)
+def test_state_of_two_words_is_unknown_until_the_deciding_one_is_read(
+    raws: dict[str, int], state: str
+) -> None:
+    profile = installed_mixer(HERTZ, STATUS_2, *TWO_WORDS)
+    assert read_chart(profile, {"TRIP": 0, **raws}).state.id == state
+
+
+async def test_state_of_two_words_is_read_from_both_in_a_run_and_a_stop() -> None:
+    installed_mixer(HERTZ, STATUS_2, *TWO_WORDS)
+    async with bench(MIXER) as made:
+        made.commander.run("forward", "20Hz")
+        assert await made.done() == "Run: Running"
+        await made.let_go_until(lambda: made.drive.motor.frequency > 19)
+        assert made.drive.raw("STAT2") & 0x300
+        made.session.image.doubt("STAT2")
+        assert made.session.state(60).kind == "unknown"
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+        assert made.writes()[-1] == (COMMAND, 0)
+
+
+def test_profile_with_a_state_of_two_words_proves_itself() -> None:
+    ways = ('[[parameters]]\ncode = "STAT"', f'{WAY}[[parameters]]\ncode = "STAT"')
+    profile = installed_mixer(HERTZ, STATUS_2, *TWO_WORDS, ways)
+    assert {step.title: step.fault for step in prove_profile(profile) if step.fault} == {}
+
+
+async def test_standstill_is_not_noted_from_a_new_and_an_old_word() -> None:
+    profile = installed_mixer(HERTZ, STATUS_2, *TWO_WORDS)
+    line = OneDrive({100: 2, 103: 0x300, 102: 0})
+    session = DriveSession(line, 1, profile)
+    await Reader(session).read(["STAT2", "TRIP"])
+    before = session.rest_seen
+    await Reader(session).read(["STAT"])
+    assert session.rest_seen == before
+    await Reader(session).read(["STAT", "STAT2"])
+    assert session.rest_seen > before
+
+
+def test_record_of_a_state_of_two_words_has_a_state_only_if_both_were_read() -> None:
+    profile = installed_mixer(HERTZ, STATUS_2, *TWO_WORDS)
+    (chart,) = profile.data.charts
+    status = [HistoryPoint(time, time, 2, 2, 2) for time in (10.0, 20.0, 200.0)]
+    further = [HistoryPoint(time, time, raw, raw, raw) for time, raw in ((15.0, 256), (21.0, 768))]
+    found = list(joined_points(status, further, 32))
+    kinds = [None if p.least is None else _kind_of(chart, int(p.least)) for p in found]
+    assert kinds == [None, "stopped", None]
+    assert [
+        _kind_of(chart, int(p.least or 0)) for p in joined_points(status[1:2], further[:1], 32)
+    ] == ["running"]

@@ -11,7 +11,7 @@ import pytest
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, ProfileData, State
-from tui.simulator.charts.own import with_bit, word_of
+from tui.simulator.charts.own_words import with_bit, words_showing
 
 from .exchange import Exchange
 from .small import head, parameter, profile
@@ -279,13 +279,14 @@ def states(*marks: tuple[str, int, int]) -> Chart:
 )
 def test_status_word_matches_its_state_only(marks: list[tuple[str, int, int]], word: int) -> None:
     chart = states(*marks)
-    assert word_of(chart, chart.states[-1]) == word
+    assert words_showing(chart, chart.states[-1]) == {chart.status: word}
 
 
 def test_extra_bit_is_omitted_if_it_would_show_another_state() -> None:
     chart = states(("first", 3, 3), ("wanted", 1, 1))
-    assert with_bit(chart, 1, 1, on=True) == 1
-    assert with_bit(chart, 1, 8, on=True) == 0x101
+    code, words = chart.status, {chart.status: 1}
+    assert with_bit(chart, words, code, 1, on=True) == 1
+    assert with_bit(chart, words, code, 8, on=True) == 0x101
 
 
 def relative() -> Profile:

@@ -54,7 +54,7 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
         return ChartState(UNLISTED_FAULT if fault_number(profile, raws) is not None else UNKNOWN)
     return ChartState(
         state=state_now(profile, chart, raws),
-        own=state_of(chart, word),
+        own=state_of(chart, raws),
         direction=_direction(chart.direction, raws),
         reached=_status_bit(chart.reached, raws),
         alarm=_status_bit(chart.alarm, raws),
@@ -64,9 +64,18 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
     )
 
 
-def state_of(chart: Chart, word: int) -> State:
-    """Return the first state of the chart whose masked value matches the word."""
-    return next((s for s in chart.states if word & s.mask == s.value), UNKNOWN)
+def state_of(chart: Chart, raws: Mapping[str, int]) -> State:
+    """Return the first state of the chart whose words fit, from raw values by code.
+
+    UNKNOWN if none fits, or if a word that decides was not read.
+    """
+    word = raws.get(chart.status)
+    for state in chart.states if word is not None else ():
+        if word is not None and word & state.mask == state.value:
+            held = [when.holds(raws) for when in state.also]
+            if False not in held:
+                return state if None not in held else UNKNOWN
+    return UNKNOWN
 
 
 def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
@@ -74,8 +83,7 @@ def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
 
     UNKNOWN if the status word was not read and there is no fault.
     """
-    word = raws.get(chart.status)
-    own = state_of(chart, word) if word is not None else UNKNOWN
+    own = state_of(chart, raws)
     if own.kind == "fault" or fault_number(profile, raws) is None:
         return own
     return next((state for state in chart.states if state.kind == "fault"), UNLISTED_FAULT)
@@ -96,7 +104,7 @@ def fault_code(profile: Profile) -> str:
 
 def state_codes(profile: Profile, chart: Chart) -> list[str]:
     """Return the codes of the words that show the state in a chart."""
-    return [code for code in (chart.status, fault_code(profile)) if code]
+    return [code for code in (*chart.status_codes, fault_code(profile)) if code]
 
 
 def watched_codes(profile: Profile) -> list[str]:
@@ -111,7 +119,7 @@ def watched_codes(profile: Profile) -> list[str]:
             chart.channel,
             chart.when,
         )
-        codes += [chart.status, *(mark.parameter for mark in marks if mark)]
+        codes += [*chart.status_codes, *(mark.parameter for mark in marks if mark)]
     if codes and (code := fault_code(profile)):
         codes.append(code)
     return list(dict.fromkeys(codes))

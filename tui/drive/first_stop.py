@@ -208,10 +208,7 @@ def _holds(order: Order, chart: Chart, known: Mapping[str, int]) -> bool:
     """Return True if a command is certainly possible now."""
     if any(not when.holds(known) for when in order.when):
         return False
-    if not order.states:
-        return True
-    word = known.get(chart.status)
-    return word is not None and state_of(chart, word).id in order.states
+    return not order.states or state_of(chart, known).id in order.states
 
 
 def _stops(chart: Chart) -> list[Order]:

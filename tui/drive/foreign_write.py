@@ -169,10 +169,8 @@ def _is_stop(
         return False
     if not all(when.holds(raws) for when in order.when):
         return False
-    if order.states:
-        status = raws.get(chart.status)
-        if status is None or state_of(chart, status).id not in order.states:
-            return False
+    if order.states and state_of(chart, raws).id not in order.states:
+        return False
     bits = _bits(order_target(profile, chart, order), words)
     return bits in (unsigned(order.words[0]), *with_options(chart, order, raws))
 
@@ -205,7 +203,7 @@ def stop_deciding_codes(profile: Profile, words: Mapping[int, int]) -> list[str]
         codes += [when.parameter for when in order.when]
         place = order_target(profile, chart, order)
         if order.states:
-            codes.append(chart.status)
+            codes += chart.status_codes
         if _bits(place, words) != unsigned(order.words[0]):
             codes.append(place.code)
     return [

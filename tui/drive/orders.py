@@ -56,9 +56,8 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | No
     same = [order for order in chart.orders if order.id == id]
     if not same:
         raise OrderRefused(f"The {chart.name} has no command {id.replace('-', ' ')!r}.")
-    word = raws.get(chart.status)
-    if state is None and word is not None:
-        state = state_of(chart, word)
+    if state is None and chart.status in raws:
+        state = state_of(chart, raws)
     fitting = [o for o in same if not o.states or (state is not None and state.id in o.states)]
     for order in fitting:
         if all(when.holds(raws) for when in order.when):
@@ -93,7 +92,7 @@ def stop_conditions(chart: Chart, id: OrderId) -> list[str]:
     same = [order for order in chart.orders if order.id == id]
     codes = [when.parameter for order in same for when in order.when]
     if any(order.states for order in same):
-        codes.append(chart.status)
+        codes += chart.status_codes
     return list(dict.fromkeys(codes))
 
 
@@ -157,9 +156,9 @@ def _ways_to_stop(profile: Profile) -> tuple[object, ...]:
     return tuple(
         (
             chart.when,
-            profile[chart.status].address,
+            tuple(profile[code].address for code in chart.status_codes),
             profile[chart.command].address if chart.command else None,
-            tuple((state.id, state.kind, state.mask, state.value) for state in chart.states),
+            tuple((s.id, s.kind, s.mask, s.value, tuple(s.also)) for s in chart.states),
             tuple(
                 (order.id, order.parameter, order.words, order.states, order.when)
                 for order in chart.orders

@@ -222,7 +222,7 @@ class DriveSession:
         """
         raws = self.image.trusted
         chart = self.profile.chart(raws)
-        if chart is None or self.image.age(chart.status) > longest:
+        if chart is None or any(self.image.age(code) > longest for code in chart.status_codes):
             return ChartState(UNKNOWN)
         fault = fault_code(self.profile)
         if fault and self.image.age(fault) > longest:

@@ -74,7 +74,7 @@ def drive_state(profile: Profile, readings: Mapping[str, Shown]) -> DriveState:
 
 def _requested(profile: Profile, readings: Mapping[str, Shown]) -> bool:
     """Return True if the words of the state are among the readings, of any quality."""
-    return any(chart.status in readings for chart in profile.data.charts)
+    return any(readings.keys() >= {*chart.status_codes} for chart in profile.data.charts)
 
 
 def _present_fault(profile: Profile, chart: ChartState, raw: int | None) -> FaultCode | None:

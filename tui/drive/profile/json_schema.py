@@ -52,6 +52,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
     "State": {
         "kind": "Meaning of the state, in the same terms for every family.",
         "value": "Masked word while the drive is in this state.",
+        "also": "Further words that must hold one of their values for this state.",
     },
     "Transition": {
         "number": "Number in the manual.",

@@ -92,8 +92,7 @@ class Commander:
             return
 
         async def work(_permit: Permit) -> str:
-            charts = session.profile.data.charts
-            codes = [*deciding_codes(session.profile), *(chart.status for chart in charts)]
+            codes = [*deciding_codes(session.profile), *session.profile.data.status_codes]
             await Reader(session).read(dict.fromkeys(codes))
             if session.state(STATE_FRESH).kind == "unknown":
                 raise OrderRefused(
@@ -333,8 +332,8 @@ async def set_option(access: CommandAccess, option: CommandOption, bits: int) ->
     reading = (await access.read([parameter.code]))[parameter.code]
     if reading.raw is None:
         raise OrderRefused(f"{parameter.code} cannot be read: {reading.error}")
-    await access.read([chart.status])
-    if option.stopped_only and state_of(chart, access.raws[chart.status]).kind in ENABLED_KINDS:
+    await access.read([*chart.status_codes])
+    if option.stopped_only and state_of(chart, access.raws).kind in ENABLED_KINDS:
         raise OrderRefused(f"Not set: {option.name} is changed with the motor stopped only.")
     word = unsigned(reading.raw) & ~option.mask | bits
     await access.write_parameter(

@@ -313,15 +313,16 @@ class MotorStop:
         frequency = session.profile.quantity("output_frequency")
         # also the command word: the next one keeps its option bits
         codes = [
-            chart.status,
+            *chart.status_codes,
             *(code for code in self.held if self.session.image.get(code) is None),
         ]
         if frequency is not None:
             codes.append(frequency.code)
         readings = await self.reader.read(codes, priority=Priority.OPERATOR_READ)
         number = readings[frequency.code].number if frequency else None
-        word = readings[chart.status].raw
-        kind = state_of(chart, word).kind if word is not None else "unknown"
+        read = {code: readings[code].raw for code in chart.status_codes}
+        raws = {code: raw for code, raw in read.items() if raw is not None}
+        kind = state_of(chart, raws).kind
         return kind, abs(number) if number is not None else None
 
 

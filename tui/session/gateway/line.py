@@ -91,9 +91,8 @@ class GatewayLine:
         session = self.drives.known(device)
         if session is None:
             return False
-        codes = list(dict.fromkeys(chart.status for chart in session.profile.data.charts))
         try:
-            await Reader(session).read(codes)
+            await Reader(session).read(session.profile.data.status_codes)
         except LineError:
             return False
         return read_chart(session.profile, session.image.fresh(2.0)).motion in STANDING_STILL

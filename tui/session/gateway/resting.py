@@ -97,8 +97,8 @@ class RestingDrives:
 
     async def _is_at_rest(self, reader: Reader) -> bool:
         profile, image = reader.profile, reader.session.image
-        status = [chart.status for chart in profile.data.charts]
-        await reader.read([*status, *chart_codes(profile)], priority=Priority.FEED)
+        codes = [*profile.data.status_codes, *chart_codes(profile)]
+        await reader.read(codes, priority=Priority.FEED)
         return read_chart(profile, image.fresh(JUST_SEEN)).motion in AT_REST
 
     def _silence(self, session: DriveSession) -> float:

@@ -98,7 +98,7 @@ class StartedMotors:
 
     async def _until_standing(self, device: int) -> None:
         session = self._sessions[device]
-        codes = list(dict.fromkeys(chart.status for chart in session.profile.data.charts))
+        codes = session.profile.data.status_codes
         end = self._loop.time() + LONGEST_LOOK
         while self._keeper.holds(device) and self._loop.time() < end:
             try:

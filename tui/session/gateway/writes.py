@@ -158,7 +158,7 @@ class GatewayWrite:
         ]
         still = any(needs_standstill(profile, parameter) for parameter in parameters)
         if still:
-            codes += [chart.status for chart in profile.data.charts]
+            codes += profile.data.status_codes
             codes += chart_codes(profile)
         raws = await self._read(list(dict.fromkeys(codes))) if codes else {}
         if still:

@@ -137,7 +137,7 @@ class Prover:
 
     def _state_codes(self) -> list[str]:
         profile = self.session.profile
-        codes = [chart.status for chart in profile.data.charts]
+        codes = [*profile.data.status_codes]
         codes += [chart.when.parameter for chart in profile.data.charts if chart.when]
         codes += [profile.data.faults.parameter, fault_code(profile) or ""]
         frequency = profile.quantity("output_frequency")

@@ -140,11 +140,14 @@ class Reader:
 
     def _note_state(self, codes: Iterable[str]) -> None:
         """Report the read state to the session, which notes when the motor was at standstill."""
-        status = {chart.status for chart in self.profile.data.charts}
-        image = self.session.image
-        for code in status.intersection(codes):
-            if (held := image.get(code)) is not None:
-                self.session.note_state(read_chart(self.profile, image.raws).motion, held.time)
+        image, read = self.session.image, frozenset(codes)
+        for status in {chart.status_codes for chart in self.profile.data.charts}:
+            # an older word beside a new one shows a state that never was
+            held = [image.get(code) for code in status] if read.issuperset(status) else [None]
+            times = [reading.time for reading in held if reading is not None]
+            if len(times) == len(held):
+                motion = read_chart(self.profile, image.raws).motion
+                self.session.note_state(motion, min(times))
 
     def seconds(self, codes: Iterable[str]) -> float:
         """Return the planned time on the wire of reading these, in seconds, without retries."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bisect import bisect_right
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
@@ -47,6 +47,37 @@ class HistoryPoint(NamedTuple):
     word changed."""
     raw: int | None = None
     """The raw value, if it is one."""
+
+
+READ_BESIDE = 2.0
+"""Seconds after a word in which another word of the same cycle is read."""
+KNOWN_FOR = 60.0
+"""Seconds for which a word that was read before another one counts with it."""
+
+
+def joined_points(
+    points: Iterable[HistoryPoint], further: Sequence[HistoryPoint], shift: int
+) -> Iterator[HistoryPoint]:
+    """Yield the points of a word with a further word, shifted left by so many bits.
+
+    The further word is the last one that was read before or in the same cycle. Without one, the
+    point has no value.
+    """
+    times = [point.time for point in further]
+    for point in points:
+        at = bisect_right(times, point.end + READ_BESIDE) - 1
+        last = further[at] if at >= 0 else None
+        fresh = last is not None and point.time - last.end <= KNOWN_FOR
+        values = (
+            point.least,
+            point.most,
+            *((last.least, last.most) if last and fresh else (None,)),
+        )
+        if None in values:
+            yield point._replace(least=None, most=None)
+            continue
+        least, most, low, high = (int(value) for value in values if value is not None)
+        yield point._replace(least=least | low << shift, most=most | high << shift)
 
 
 @dataclass(slots=True)

@@ -22,7 +22,7 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, Quantity, StateKind
 
-from .decoding import HistoryPoint
+from .decoding import HistoryPoint, joined_points
 from .history import History, read_history
 from .numbers import number_text
 from .reader import RecordReader
@@ -180,18 +180,21 @@ def history_of(
     chart = profile.chart(words)
     if chart is None:
         return DriveHistory()
-    points = read(chart.status)
+    points = states = read(chart.status)
+    for place, code in enumerate(chart.status_codes[1:], 1):
+        states = list(joined_points(states, read(code), 32 * place))
     kinds = partial(_kind_of, chart)
-    spans = list(_spans(points, kinds, ENABLED_KINDS))
+    spans = list(_spans(states, kinds, ENABLED_KINDS))
     references = _references(line.files, device, profile, spans)
     runs = [_described(line, device, profile, chart, references, span) for span in spans]
     faults = read(profile.data.faults.parameter)
-    trips = list(_trips(device, profile, points, kinds, faults))
+    trips = list(_trips(device, profile, states, kinds, faults))
     return DriveHistory(runs, trips, list(_silences(device, points)))
 
 
 def _kind_of(chart: Chart, word: int) -> StateKind:
-    return state_of(chart, word).kind
+    codes = enumerate(chart.status_codes)
+    return state_of(chart, {code: word >> 32 * at & 0xFFFFFFFF for at, code in codes}).kind
 
 
 def _trips(

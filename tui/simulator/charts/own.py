@@ -8,141 +8,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from itertools import combinations
 
-from tui.drive.chart import state_of
-from tui.drive.orders import locked_by, order_target
-from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import (
     Chart,
     Order,
     OrderId,
     Parameter,
     State,
-    StateKind,
     StatusBit,
-    Transition,
 )
-from tui.drive.words import unsigned
 
 from ..body import Body, Fallback
 from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
+from .own_orders import OwnOrders
 from .own_reference import OwnReference
-
-Raws = Callable[[], Mapping[str, int]]
-
-
-class OwnOrders:
-    """Follower of the words that the line writes; reports the commands that they complete.
-
-    Bits of options are ignored in every comparison. A command of several words is complete with the
-    last of them, if it began in a state that allows it.
-    """
-
-    def __init__(self, profile: Profile, raws: Raws) -> None:
-        self._profile = profile
-        self._raws = raws
-        self._places: dict[int, int] = {}
-        """Number of received words of a command, by its place in the chart."""
-        self._last: dict[str, int] = {}
-
-    def forget(self) -> None:
-        """Forget all written words."""
-        self._places.clear()
-        self._last.clear()
-
-    def transition(self, chart: Chart, state: State, where: Parameter, raw: int) -> str:
-        """Return the next state by a written command word; empty if it leads to none."""
-        if not chart.command or self._profile[chart.command] is not where:
-            return ""
-        steps = [s for s in chart.transitions if s.source == state.id and s.command is not None]
-        fitting = (s for s in steps if self._makes(chart, where, raw, s))
-        step = next(fitting, None)
-        return step.target if step else ""
-
-    def _makes(self, chart: Chart, where: Parameter, raw: int, step: Transition) -> bool:
-        if step.edge_bit is not None:
-            rising = raw & ~self._last.get(where.code, 0)
-            return bool(rising >> step.edge_bit & 1)
-        return self._same(chart, where, raw, step.command or 0)
-
-    def complete(self, chart: Chart, state: State, where: Parameter, raw: int) -> Order | None:
-        """Return the command that a written word completes in this state.
-
-        Of several, the longest: the 0 at the end of a reset is not the stop.
-        """
-        raws = self._raws()
-        done = None
-        for place, order in enumerate(chart.orders):
-            if order_target(self._profile, chart, order) is not where or not order.words:
-                continue
-            come = self._places.get(place, 0)
-            if come == 0 and order.states and state.id not in order.states:
-                continue
-            if not all(raws.get(when.parameter) in when.values for when in order.when):
-                continue
-            come = self._next(chart, where, raw, order, come)
-            self._places[place] = come % len(order.words)
-            if come == len(order.words) and (done is None or come > len(done.words)):
-                done = order
-        if done is not None and locked_by(chart, done.id, raws) is not None:
-            return None
-        return done
-
-    def _next(self, chart: Chart, where: Parameter, raw: int, order: Order, come: int) -> int:
-        if self._same(chart, where, raw, order.words[come]):
-            return come + 1
-        return int(self._same(chart, where, raw, order.words[0]))
-
-    def note(self, where: Parameter, raw: int) -> None:
-        """Record a written word, to detect the edges of the next."""
-        self._last[where.code] = raw
-
-    @staticmethod
-    def _same(chart: Chart, where: Parameter, raw: int, word: int) -> bool:
-        kept = 0
-        for option in chart.options:
-            if option.parameter == where.code:
-                kept |= option.mask
-        return unsigned(raw) & ~kept == unsigned(word) & ~kept
-
-
-MOST_CLEARED = 3
-"""Most bits, in addition to a state's own, that are tried in combination until no earlier state
-fits."""
-REST_KINDS: tuple[StateKind, ...] = ("ready", "stopped", "blocked", "starting")
-
-
-def word_of(chart: Chart, state: State) -> int:
-    """Return a status word that means this state; its value if no earlier state matches that."""
-    if state_of(chart, state.value) is state:
-        return state.value
-    others = 0
-    for before in chart.states:
-        others |= before.mask
-    bits = [1 << bit for bit in range(32) if others & ~state.mask & 1 << bit]
-    for count in range(1, MOST_CLEARED + 1):
-        for chosen in combinations(bits, count):
-            word = state.value | sum(chosen)
-            if state_of(chart, word) is state:
-                return word
-    return state.value
-
-
-def state_of_kind(chart: Chart, *kinds: StateKind) -> State | None:
-    """Return the first state of the first of these kinds that the chart has."""
-    for kind in kinds:
-        for state in chart.states:
-            if state.kind == kind:
-                return state
-    return None
-
-
-def with_bit(chart: Chart, word: int, bit: int, *, on: bool) -> int:
-    """Return a status word with a bit of separate meaning, unless that would show another state."""
-    marked = word | 1 << bit if on else word & ~(1 << bit)
-    return marked if state_of(chart, marked) is state_of(chart, word) else word
+from .own_words import REST_KINDS, state_masks, state_of_kind, with_bit, words_showing
 
 
 def _agrees(order: Order, led: State) -> bool:
@@ -359,7 +240,10 @@ class OwnChart:
         chart = self._chart
         if chart is not None and chart.states:
             state = self._state(chart)
-            body.show_code(chart.status, word_of(chart, state))
+            deciding = state_masks(chart, chart.states)
+            for code, word in words_showing(chart, state).items():
+                kept = 0 if code == chart.status else self._word(code) & ~deciding[code]
+                body.show_code(code, word | kept)
             reached = motor.energised and abs(motor.frequency - self._target_hz) < OWN_REACHED_HZ
             self._mark(chart, chart.reached, reached)
             self._mark(chart, chart.alarm, body.alarms != 0)
@@ -375,13 +259,17 @@ class OwnChart:
         body.show("ramp_output", motor.frequency)
         body.show("output_frequency", motor.frequency)
 
+    def _word(self, code: str) -> int:
+        return self._body.registers.present(self._body.profile[code])
+
     def _mark(self, chart: Chart, mark: StatusBit | None, holds: bool) -> None:
         if mark is None or (parameter := self._body.registers.named(mark.parameter)) is None:
             return
         word = self._body.registers.present(parameter)
         on = holds == bool(mark.value)
-        if mark.parameter == chart.status:
-            word = with_bit(chart, word, mark.bit, on=on)
+        if mark.parameter in chart.status_codes:
+            words = {code: self._word(code) for code in chart.status_codes}
+            word = with_bit(chart, words, mark.parameter, mark.bit, on=on)
         else:
             word = word | 1 << mark.bit if on else word & ~(1 << mark.bit)
         self._body.registers.put(parameter, word)

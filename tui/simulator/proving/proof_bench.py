@@ -117,12 +117,13 @@ class ProofBench:
         return read_chart(self.profile, self._known())
 
     def own(self) -> State:
-        """Read the state by the status word alone."""
-        return state_of(self.chart, self.read(self.profile[self.chart.status]))
+        """Read the state by the status words alone."""
+        codes = self.chart.status_codes
+        return state_of(self.chart, {code: self.read(self.profile[code]) for code in codes})
 
     def _known(self) -> Mapping[str, int]:
         chart, faults = self.chart, self.profile.data.faults
-        codes = [chart.status, *deciding_codes(self.profile), *interlock_codes(chart)]
+        codes = [*chart.status_codes, *deciding_codes(self.profile), *interlock_codes(chart)]
         marks = (chart.direction, chart.reached, chart.local, chart.alarm)
         codes += [mark.parameter for mark in marks if mark is not None]
         codes += [option.parameter for option in chart.options]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ..schema import Chart, ProfileData
+from tui.drive.words import type_bits
+
+from ..schema import Chart, Parameter, ProfileData, When
 from ..toml_lines import TomlPath
 
 RUN_ORDERS = frozenset({"forward", "reverse"})
@@ -48,7 +50,8 @@ def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield states that can never be reached."""
-    wide = {parameter.code for parameter in data.parameters if parameter.type.endswith("32")}
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    wide = {code for code, parameter in parameters.items() if parameter.type.endswith("32")}
     for index, chart in enumerate(data.charts):
         for place, state in enumerate(chart.states):
             at: TomlPath = ("charts", index, "states", place)
@@ -59,8 +62,14 @@ def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                     at,
                     f"chart {chart.id}: state {state.id} has value bits outside its mask.",
                 )
+            for when in state.also:
+                if fault := _further_fault(chart, when, parameters.get(when.parameter)):
+                    yield at, f"chart {chart.id}: state {state.id}: {fault}"
             for before in chart.states[:place]:
-                if not before.mask & ~state.mask and state.value & before.mask == before.value:
+                same = not before.mask & ~state.mask and state.value & before.mask == before.value
+                if same and all(
+                    any(_implies(own, when) for own in state.also) for when in before.also
+                ):
                     yield (
                         at,
                         f"chart {chart.id}: state {state.id} is never reached: {before.id} above"
@@ -68,6 +77,30 @@ def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                         f" {before.id}, or give {before.id} a wider mask.",
                     )
                     break
+
+
+def _further_fault(chart: Chart, when: When, parameter: Parameter | None) -> str:
+    """Return why a further word of a state shows nothing; empty if it can."""
+    if when.parameter in (chart.status, chart.command):
+        return f"also names {when.parameter}. It is for words beside the status word."
+    if parameter is None:
+        return ""  # reported with the names
+    if parameter.access == "w":
+        return f"also names {parameter.code}, which cannot be read."
+    if parameter.type == "float32" or parameter.unit:
+        return f"also names {parameter.code}, which is a measurement, not a word with bits."
+    mask = type_bits(parameter) if when.mask is None else when.mask
+    if not when.values or any(value & ~mask for value in when.values):
+        return f"a value of {parameter.code} has bits outside its mask, or none is given."
+    if mask & ~type_bits(parameter):
+        return f"{parameter.code} has 16 bits, its mask more."
+    return ""
+
+
+def _implies(own: When, other: When) -> bool:
+    """Return True if a condition that holds makes another one hold."""
+    same = own.parameter == other.parameter and own.mask == other.mask
+    return same and set(own.values) <= set(other.values)
 
 
 def stops_always(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:

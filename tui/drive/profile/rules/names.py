@@ -78,6 +78,9 @@ def _chart_names(chart: Chart) -> Iterator[NamedPlace]:
     for key in ("direction", "reached", "alarm", "local", "channel", "when"):
         if (mark := getattr(chart, key)) is not None:
             yield (key,), mark.parameter
+    for place, state in enumerate(chart.states):
+        for when in state.also:
+            yield ("states", place, "also"), when.parameter
     for key in ("orders", "interlocks", "options"):
         for place, row in enumerate(getattr(chart, key)):
             yield (key, place, "parameter"), row.parameter

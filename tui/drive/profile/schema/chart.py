@@ -30,6 +30,8 @@ class State(Table, frozen=True, kw_only=True):
     kind: StateKind
     mask: LongWord
     value: LongWord
+    also: list[When] = []
+    """Further words that must fit; the state is unknown until they are read."""
 
 
 class Transition(Table, frozen=True, kw_only=True):
@@ -172,6 +174,12 @@ class Chart(Table, frozen=True, kw_only=True):
     note: str = ""
     source: str = ""
     confidence: Confidence = "manual"
+
+    @property
+    def status_codes(self) -> tuple[str, ...]:
+        """Codes of the words that show the state: the status word first."""
+        further = (when.parameter for state in self.states for when in state.also)
+        return tuple(dict.fromkeys((self.status, *further)))
 
 
 class CommandExample(Table, frozen=True, kw_only=True):

@@ -213,3 +213,8 @@ class ProfileData(Table, frozen=True, kw_only=True):
     groups: list[ParameterGroup] = []
     enumerations: list[Enumeration] = []
     parameters: list[Parameter]
+
+    @property
+    def status_codes(self) -> tuple[str, ...]:
+        """Codes of the words that show the state in any chart."""
+        return tuple(dict.fromkeys(code for chart in self.charts for code in chart.status_codes))
