@@ -89,9 +89,10 @@ def test_no_modules_import_each_other_in_a_circle() -> None:
 def test_each_module_is_imported_or_run() -> None:
     """Commands and registrations are imported by the names that lists have."""
     from tui.cli.command_index import COMMANDS
-    from tui.screens.keys.table import PACKAGES
+    from tui.screens.keys.table import PACKAGES, SCREENS
 
     by_name = {f"tui.screens.{package}.registration" for package in PACKAGES}
+    by_name |= {f"tui.screens.{item.screen.rpartition('.')[0]}" for item in SCREENS}
     by_name |= {f"tui.cli.commands.{module}" for module, *_ in COMMANDS.values()}
     by_name |= {"tui.__main__", "tui.keeper.__main__", "tui.cli.derived", "tui.screens.keys.pages"}
     by_name.add("tui.bus.fake")  # for tests of scripts

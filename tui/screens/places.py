@@ -90,7 +90,7 @@ class Places(Panel):
             self.show_monitor(console)
         while len(self.screen_stack) > 2:
             self.pop_screen()
-        if place == MONITOR or registered.create is None:
+        if not registered.screen:
             return None
         shown: AwaitMount = self.push_screen(registered.create(console))
         return shown

@@ -2,22 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..keys.action import ARMING, Registration, key_rows
-
-if TYPE_CHECKING:
-    from textual.screen import Screen
-
-    from tui.session.console import DriveConsole
-
-
-def create_blocks(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
-    from .screen import BlocksScreen
-
-    return BlocksScreen(console)
-
 
 REGISTERED = (
     Registration(
@@ -25,7 +10,7 @@ REGISTERED = (
         about="indirect blocks, or the communication scanner",
         digit="4",
         narrow="Scan",
-        create=create_blocks,
+        screen="blocks.screen.BlocksScreen",
         actions=(
             *ARMING,
             *key_rows(

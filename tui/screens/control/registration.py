@@ -7,8 +7,6 @@ from typing import TYPE_CHECKING
 from ..keys.action import ARMING, Action, Registration, key_rows
 
 if TYPE_CHECKING:
-    from textual.screen import Screen
-
     from tui.session.console import DriveConsole
 
 CHOOSE_WORD = "Choose the parameter that this word shows."
@@ -17,13 +15,6 @@ WRITE_SOURCE = (
     "Open the parameter of a step, or write the chosen configuration. Writing needs arming and"
     " standstill, and asks first."
 )
-
-
-def create_control(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
-    from .screen import ControlSourceScreen
-
-    return ControlSourceScreen(console)
 
 
 def no_sources(console: DriveConsole) -> str:
@@ -37,20 +28,13 @@ def no_sources(console: DriveConsole) -> str:
     )
 
 
-def create_map(console: DriveConsole) -> Screen[None]:
-    """Create the communication map of a drive."""
-    from .map_screen import MapScreen
-
-    return MapScreen(console)
-
-
 REGISTERED = (
     Registration(
         title="Control",
         about="the control source, and the reaction to a communication loss",
         digit="6",
         narrow="Ctl",
-        create=create_control,
+        screen="control.screen.ControlSourceScreen",
         refusal=no_sources,
         actions=(
             *ARMING,
@@ -63,7 +47,7 @@ REGISTERED = (
     Registration(
         title="Map",
         tab="Control",
-        create=create_map,
+        screen="control.map_screen.MapScreen",
         actions=(
             Action("choose_word", "enter", "choose", CHOOSE_WORD, bound=False),
             *key_rows(

@@ -2,22 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..keys.action import ARMING, RESET_FAULT, Registration, key_rows
-
-if TYPE_CHECKING:
-    from textual.screen import Screen
-
-    from tui.session.console import DriveConsole
-
-
-def create_faults(console: DriveConsole) -> Screen[None]:
-    """Create Faults for a drive; the import waits until the screen is needed."""
-    from .screen import FaultsScreen
-
-    return FaultsScreen(console)
-
 
 REGISTERED = (
     Registration(
@@ -26,7 +11,7 @@ REGISTERED = (
         " the history",
         digit="5",
         narrow="Flt",
-        create=create_faults,
+        screen="faults.screen.FaultsScreen",
         actions=(
             *ARMING,
             RESET_FAULT,

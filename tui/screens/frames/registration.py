@@ -2,15 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..keys.action import Registration, key_rows
-
-if TYPE_CHECKING:
-    from textual.screen import Screen
-
-    from tui.session.console import DriveConsole
-
 
 LISTING = key_rows(
     ("hold", "h", "pause", "Pause or resume the list."),
@@ -25,20 +17,13 @@ LISTING = key_rows(
 """Actions of both Frames and Listening."""
 
 
-def create_frames(console: DriveConsole) -> Screen[None]:
-    """Create Frames for the line of a drive; imports the screen at the first use."""
-    from .screen import FramesScreen
-
-    return FramesScreen(console)
-
-
 REGISTERED = (
     Registration(
         title="Frames",
         about="requests and replies on the line",
         digit="7",
         narrow="Frm",
-        create=create_frames,
+        screen="frames.screen.FramesScreen",
         actions=(
             *LISTING,
             *key_rows(

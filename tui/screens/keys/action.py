@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
 from tui.drive.reset_text import MAY_START
@@ -164,15 +165,15 @@ class Registration(NamedTuple):
     about: str = ""
     """Its content in a few words, for docs/screens; empty for a screen that has no page."""
     digit: str = ""
-    """The key that opens it from every screen; it then has a tab, and `create`."""
+    """The key that opens it from every screen; it then has a tab."""
     key: str = ""
     """The key that opens it, if it has no digit."""
     narrow: str = ""
     """Its name in the tabs of a narrow terminal."""
     tab: str = ""
     """The title of the screen whose tab is lit, for a page or a mode of it that has no digit."""
-    create: Callable[[DriveConsole], Screen[None]] | None = None
-    """Creates the screen on a drive; imports it when called."""
+    screen: str = ""
+    """Its class in `tui.screens`, as `package.module.Class`; a screen on a drive has one."""
     refusal: Callable[[DriveConsole], str] = lambda console: ""
     """Reason why it cannot be shown for a drive; empty if it can."""
 
@@ -180,3 +181,9 @@ class Registration(NamedTuple):
     def name(self) -> str:
         """Its name in the code."""
         return self.title.lower()
+
+    def create(self, console: DriveConsole) -> Screen[None]:
+        """Import the screen, and create it on a drive."""
+        module, _, name = self.screen.rpartition(".")
+        made: Screen[None] = getattr(import_module(f"tui.screens.{module}"), name)(console)
+        return made

@@ -2,14 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..keys.action import ARMING, RESET_FAULT, TEACH, Registration, key_rows
-
-if TYPE_CHECKING:
-    from textual.screen import Screen
-
-    from tui.session.console import DriveConsole
 
 RUN = "Run forward. Opens the run line; Enter runs. Needs arming."
 REVERSE = "Run reverse. Opens the run line; Enter runs. Needs arming."
@@ -65,20 +58,12 @@ COMMAND_ACTIONS = (
 """Actions that command the drive."""
 
 
-def create_monitor(console: DriveConsole) -> Screen[None]:
-    """Create Monitor for a drive; the import waits until the screen is needed."""
-    from .screen import MonitorScreen
-
-    return MonitorScreen(console)
-
-
 REGISTERED = (
     Registration(
         title="Monitor",
         about="the state of the motor; commands",
         digit="2",
         narrow="Mon",
-        create=create_monitor,
         actions=(
             *ARMING,
             *COMMAND_ACTIONS,

@@ -2,23 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..keys.action import ARMING, TEACH, Registration, key_rows
 
-if TYPE_CHECKING:
-    from textual.screen import Screen
-
-    from tui.session.console import DriveConsole
-
 KEEP = "Confirm an unverified parameter, or keep an edit if another program changed the value."
-
-
-def create_parameters(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
-    from .screen import ParametersScreen
-
-    return ParametersScreen(console)
 
 
 REGISTERED = (
@@ -27,7 +13,7 @@ REGISTERED = (
         about="every parameter of the drive; edit, back up, compare, restore",
         digit="3",
         narrow="Par",
-        create=create_parameters,
+        screen="parameters.screen.ParametersScreen",
         actions=(
             *ARMING,
             *key_rows(

@@ -7,16 +7,7 @@ from typing import TYPE_CHECKING
 from ..keys.action import Registration, key_rows
 
 if TYPE_CHECKING:
-    from textual.screen import Screen
-
     from tui.session.console import DriveConsole
-
-
-def create_start_up(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
-    from .screen import StartUpScreen
-
-    return StartUpScreen(console)
 
 
 def no_start_up(console: DriveConsole) -> str:
@@ -31,7 +22,7 @@ REGISTERED = (
         title="Start-up",
         about="the steps of a commissioning, with their results",
         key="B",
-        create=create_start_up,
+        screen="startup.screen.StartUpScreen",
         refusal=no_start_up,
         actions=key_rows(
             ("open", "enter", "open", "Do what the row says: record, or go where it is done."),

@@ -2,22 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..keys.action import Registration, key_rows
-
-if TYPE_CHECKING:
-    from textual.screen import Screen
-
-    from tui.session.console import DriveConsole
-
-
-def create_trend(console: DriveConsole) -> Screen[None]:
-    """Create Trend for the line of a drive; the import waits until the screen is needed."""
-    from .screen import TrendScreen
-
-    return TrendScreen(console)
-
 
 REGISTERED = (
     Registration(
@@ -25,7 +10,7 @@ REGISTERED = (
         about="up to four parameters of any drives over 10 s to 24 h: from the record, and live",
         digit="8",
         narrow="Trd",
-        create=create_trend,
+        screen="trend.screen.TrendScreen",
         actions=key_rows(
             ("move_cursor(-1)", "left", "", "Move the cursor back in time; the curves are held."),
             ("move_cursor(1)", "right", "", "Move the cursor forward in time."),

@@ -2,29 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from ..keys.action import Registration, key_rows
-
-if TYPE_CHECKING:
-    from textual.screen import Screen
-
-    from tui.session.console import DriveConsole
-
-
-def create_wiring(console: DriveConsole) -> Screen[None]:
-    """Create the screen on a drive."""
-    from .screen import WiringScreen
-
-    return WiringScreen(console)
-
 
 REGISTERED = (
     Registration(
         title="Wiring",
         about="pins, line rules, warnings and errata of the family",
         key="I",
-        create=create_wiring,
+        screen="wiring.screen.WiringScreen",
         actions=key_rows(
             ("scroll(-1)", "up", "", "Scroll up one line."),
             ("scroll(1)", "down", "scroll", "Scroll down one line."),
