@@ -80,7 +80,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     blocks = re.findall(r"^```python\n(.*?)^```$", section(), re.M | re.S)
     for name, block in zip(MODULES, blocks, strict=True):
         (package / f"{name}.py").write_text(block, "utf-8")
-    screens = copy / "tui" / "screens" / "keys" / "screens.py"
+    screens = copy / "tui" / "screens" / "keys" / "table.py"
     listed = screens.read_text("utf-8")
     assert listed.count(LAST_PACKAGE) == 1
     screens.write_text(listed.replace(LAST_PACKAGE, f'{LAST_PACKAGE}    "load",\n'), "utf-8")
