@@ -41,7 +41,7 @@ DEFECTS = (
     ),
     Defect(
         "frame-cut-at-its-zero",
-        "tui/wire/observed/lengths.py",
+        "tui/wire/observed/splitting.py",
         "or due is None or any(n > len(data) for n in due):",
         "and True:",
         "A reply that ends with a zero is truncated, and its values are lost.",
@@ -89,7 +89,7 @@ DEFECTS = (
     ),
     Defect(
         "requests-feed-without-an-answer",
-        "tui/session/listening/tally.py",
+        "tui/session/listening/listener.py",
         "        if exchange.turnaround is not None:\n",
         "        if exchange.turnaround is None:\n            self.fed = exchange.time\n"
         "        else:\n",
@@ -98,7 +98,7 @@ DEFECTS = (
     ),
     Defect(
         "pause-of-now-forgotten",
-        "tui/session/listening/tally.py",
+        "tui/session/listening/listener.py",
         "now - self.fed if self.fed is not None else 0.0)",
         "0.0)",
         "A master that has exited is shown as keeping its drives alive.",

@@ -15,7 +15,7 @@ from tui.drive.errors import ProfileError
 from tui.drive.hints import RESETS, reset_ready, reset_text
 from tui.drive.profile import json_schema, library
 from tui.drive.profile.schema import AlarmHelp, FaultHelp, HelpData, ResetWay
-from tui.drive.reset_text import MAY_START
+from tui.drive.sentences import MAY_START
 
 FAMILIES = sorted(item.id for item in library.listings())
 COUNTS = {"atv21": (38, 16), "atv31": (27, 5), "atv312": (31, 5), "atv71": (74, 30)}

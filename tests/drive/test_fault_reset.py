@@ -17,7 +17,7 @@ from tui.drive.fault_reset import (
     reset_follows,
 )
 from tui.drive.profile import library
-from tui.drive.reset_text import MAY_START
+from tui.drive.sentences import MAY_START
 
 LINE = "runs only on a new run command"
 BY_LINE: Mapping[str, Mapping[str, int]] = {

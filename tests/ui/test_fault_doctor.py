@@ -13,10 +13,10 @@ from tui.drive.profile import library
 from tui.drive.sentences import capitalized
 from tui.screens.faults.doctor import EXCLUDED, LIKELIEST, OPEN, TOO_FEW, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
-from tui.screens.faults.history import history_rows
 from tui.screens.faults.next_steps import ARM, BESIDE_KEY
 from tui.screens.faults.parts import LABEL
 from tui.screens.faults.screen import FaultsScreen
+from tui.screens.faults.view import history_rows
 from tui.session.drive import DriveSession
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord

@@ -11,7 +11,7 @@ from textual.visual import VisualType
 
 from tui.drive.profile import library
 from tui.screens.connection.drive_list import DriveList
-from tui.screens.connection.found import about_drive, next_step
+from tui.screens.connection.rows import about_drive, next_step
 from tui.screens.connection.state import QUIET
 from tui.screens.connection.wall import (
     WALL_SIGNS,

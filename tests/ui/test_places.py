@@ -26,13 +26,12 @@ from tui.screens.monitor.assembly import (
     value_cells,
     watched_words,
 )
-from tui.screens.monitor.readouts import readout_lines
+from tui.screens.monitor.readouts import gauge, readout_lines
 from tui.screens.monitor.screen import order_keys
 from tui.screens.monitor.view import View
 from tui.session.monitor.trend import TrendPoint, readout_parameter
 from tui.session.shown import Quality
 from tui.widgets.drawing import key_line
-from tui.widgets.gauge import gauge
 from tui.widgets.palette import STOP_KEY
 
 from . import fakes

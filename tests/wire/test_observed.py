@@ -10,9 +10,8 @@ from hypothesis import strategies as st
 
 from tests.simulator.manual import FRAMES, Frame
 from tui.wire.frames import frame, is_whole, read_frame, read_write_frame, write_frame
-from tui.wire.observed.lengths import whole_length
 from tui.wire.observed.pairing import ObservedExchange, Pairing
-from tui.wire.observed.splitting import FrameSplitter, ObservedFrame
+from tui.wire.observed.splitting import FrameSplitter, ObservedFrame, whole_length
 
 CHARACTER = 11 / 19200
 WORD = st.integers(0, 0xFFFF)

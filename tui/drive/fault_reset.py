@@ -10,7 +10,7 @@ from .command_blocked import blocked_reason
 from .orders import chart_in_force, deciding_codes, follows_from
 from .profile.profile import Profile
 from .profile.schema import Chart, StateKind
-from .reset_text import MAY_START
+from .sentences import MAY_START
 from .values import set_bits
 
 NOT_IN_COMMAND = "Drive Panel does not hold the command channel"

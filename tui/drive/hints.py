@@ -18,7 +18,7 @@ from .causes import (
 )
 from .profile.profile import Profile
 from .profile.schema import AlarmHelp, FaultHelp, HelpConfidence, Hint, ResetWay
-from .reset_text import MAY_START
+from .sentences import MAY_START
 from .values import set_bits
 
 TRUST: Mapping[HelpConfidence, str] = {

@@ -1,8 +1,11 @@
-"""Sentences with a count: one for a single thing, one for several or none."""
+"""Sentences with a count, one for a single thing, one for several or none; and a general one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+
+MAY_START = "A run command that is still present may start the motor."
+"""The effect of a reset, for help and for a drive whose command channel is not known."""
 
 
 def counted(count: int, single: str, several: str, **values: object) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from .observed.lengths import fits_reply, fits_request
+from .observed.splitting import fits_reply, fits_request
 
 READS = {1: "coils", 2: "inputs", 3: "register", 4: "input register"}
 WRITES = {5: "coil", 6: "register", 15: "coils", 16: "register"}

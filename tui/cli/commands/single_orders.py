@@ -11,7 +11,7 @@ import click
 
 from tui.bus.errors import LineError
 from tui.drive.fault_reset import not_in_command, reset_codes, reset_follows
-from tui.drive.reset_text import MAY_START
+from tui.drive.sentences import MAY_START
 from tui.session.patience import patience
 from tui.session.running.watching import COMMAND_POLL_INTERVAL, latest_of
 

@@ -1,4 +1,4 @@
-"""Documents about a drive: identity, state, commands, and why it does not answer."""
+"""Documents about a drive: identity, state, commands, evidence, and why it does not answer."""
 
 from __future__ import annotations
 
@@ -8,30 +8,54 @@ from msgspec import UNSET, Meta, UnsetType
 
 from tui.bus.api import Contact
 
-from .counter_parts import (
-    CountingTestField,
-    DifferenceField,
-    DriveCountersField,
-    LastMinutesField,
-    LoadField,
-    OurCountersField,
-)
 from .document import Document, DocumentPart, DriveDocument, TimeoutField
 from .parts import (
     AlarmField,
     ControlField,
+    CountingTestField,
+    DifferenceField,
+    DriveCountersField,
     EepromField,
     FaultField,
     FirstWordField,
     HeardField,
+    LastMinutesField,
     LeftBehindDocument,
+    LoadField,
     ModelField,
     OldTimeoutField,
+    OurCountersField,
     StateField,
     StatusWordField,
     ValueField,
     WatchedValueField,
 )
+
+
+class FindingField(DocumentPart):
+    """Result for one statement of a profile, as in the file of evidence."""
+
+    subject: Literal["identity", "address", "range", "value", "frame"]
+    name: str
+    statement: str
+    result: Literal["confirmed", "contradicted", "open"]
+    seen: str
+
+
+class ConfirmDocument(Document, kw_only=True):
+    """`profiles confirm`: what a drive shows about its profile."""
+
+    command: Literal["profiles"] = "profiles"
+    profile: str
+    file: str
+    tested_on: Literal["drive", "simulated", "unknown"]
+    reference: str
+    firmware: str
+    confirmed: int
+    contradicted: int
+    open: int
+    findings: list[FindingField]
+
 
 PrintedRunEvent = Literal[
     "control", "reference", "order", "state", "ended", "stopping", "stopped", "left-running"

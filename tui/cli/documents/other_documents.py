@@ -7,8 +7,8 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from .counter_parts import LastMinuteField
 from .document import Document, DocumentPart
+from .parts import LastMinuteField
 
 
 class PortDocument(Document, kw_only=True):

@@ -13,10 +13,9 @@ from typing import TYPE_CHECKING, Literal
 
 from tui.bus.api import Contact
 
-from ..documents.counter_parts import LastMinuteField
 from ..documents.document import DocumentPart, TimeoutField
 from ..documents.drive_documents import CycleTime
-from ..documents.parts import WatchedValueField
+from ..documents.parts import LastMinuteField, WatchedValueField
 from ..shared.output import json_text, last_minute_field
 from ..shared.watch_outputs import cycle_document
 from .broker import level

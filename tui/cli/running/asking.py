@@ -1,13 +1,33 @@
-"""A question on the terminal while the program goes on with its work."""
+"""Questions on the terminal: while the program goes on, and before frequent EEPROM writes."""
 
 from __future__ import annotations
 
 import asyncio
 import os
 import sys
+from collections.abc import Collection
 from contextlib import suppress
+from typing import TYPE_CHECKING
 
-from ..shared.say import say_prompt
+from ..shared.say import Messages, say_prompt
+
+if TYPE_CHECKING:
+    from tui.session.journal import Journal
+    from tui.session.settings.wear import WearGate
+
+
+def wear_gate(journal: Journal, confirmed: Collection[str], messages: Messages) -> WearGate:
+    """Return the decision of a command: warn, ask at a terminal, else require --confirm CODE."""
+    from tui.session.settings.wear import WearGate
+
+    return WearGate(
+        journal.eeprom,
+        confirmed,
+        says_yes if may_ask() else None,
+        messages.complain,
+        "Use --confirm {code} to write it anyway.",
+    )
+
 
 YES = frozenset({"y", "yes"})
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
-    from ..documents.evidence_documents import ConfirmDocument
+    from ..documents.drive_documents import ConfirmDocument
 
 LISTED = 20
 """Open statements that a person is shown; the file has all."""
@@ -149,7 +149,7 @@ def _write(path: Path, evidence: ProfileEvidence, *, force: bool) -> None:
 def _document(evidence: ProfileEvidence, path: Path) -> ConfirmDocument:
     import msgspec
 
-    from ..documents.evidence_documents import ConfirmDocument, FindingField
+    from ..documents.drive_documents import ConfirmDocument, FindingField
 
     return ConfirmDocument(
         profile=evidence.profile,

@@ -17,7 +17,7 @@ from ..shared.output import print_json
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.simulator.proving.proof_step import ProofStep
+    from tui.simulator.proving.proof_bench import ProofStep
 
 ONLY_SIMULATED = (
     "The simulated drive does what the file says. Only a real drive shows if that is true."

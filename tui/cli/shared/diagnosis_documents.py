@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from tui.session.diagnosis.diagnosis import Diagnosis
     from tui.session.drive import DriveSession
 
-    from ..documents.counter_parts import OurCountersField
     from ..documents.document import Document, DriveFields
     from ..documents.drive_documents import (
         CertaintyText,
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
         MeasuredReads,
         WhyDocument,
     )
+    from ..documents.parts import OurCountersField
 
 
 def drive_documents() -> DriveDocuments:
@@ -122,14 +122,14 @@ def counters_document(
     fields: DriveFields, found: CountersNow, frames: int, answered: int, *, reset: bool
 ) -> CountersDocument:
     """The counts as a document; so many of the sent `frames` were answered."""
-    from ..documents.counter_parts import (
+    from ..documents.drive_documents import CountersDocument
+    from ..documents.parts import (
         CountingTestField,
         DifferenceField,
         DriveCountersField,
         LastMinutesField,
         LoadField,
     )
-    from ..documents.drive_documents import CountersDocument
 
     return CountersDocument(
         **fields,
@@ -168,7 +168,7 @@ def counters_document(
 def _ours_field(ours: DeviceCounters) -> OurCountersField:
     from tui.session.counters.compare import bars
 
-    from ..documents.counter_parts import OurCountersField, TurnaroundField
+    from ..documents.parts import OurCountersField, TurnaroundField
 
     return OurCountersField(
         frames=ours.requests,

@@ -13,12 +13,11 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.session.patience import patience
 
 from .control import control_field, control_row
-from .eeprom_output import eeprom_counts, eeprom_field, eeprom_rows
 from .errors import DONE, LINE_TROUBLE
 from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
 from .left_behind import LeftBehind, left_behind
 from .rows import Column
-from .status_words import word_fields, word_rows
+from .status_words import eeprom_counts, eeprom_field, eeprom_rows, word_fields, word_rows
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile

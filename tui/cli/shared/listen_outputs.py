@@ -11,9 +11,8 @@ from .say import say
 if TYPE_CHECKING:
     from tui.drive.read_plan import ReadRequest
     from tui.session.listening.families import AssumedProfile, Families
-    from tui.session.listening.listener import DecodedExchange
+    from tui.session.listening.listener import DecodedExchange, ReadTally, WriteTally
     from tui.session.listening.summary import DriveSummary, ListeningSummary
-    from tui.session.listening.tally import ReadTally, WriteTally
     from tui.session.listening.words import ObservedValue, WordSpan
 
     from ..documents.listening_documents import (

@@ -25,9 +25,8 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.reading import Reading
 
-    from ..documents.counter_parts import LastMinuteField
     from ..documents.document import Document, DocumentPart, DriveFields
-    from ..documents.parts import QualityText, ValueField
+    from ..documents.parts import LastMinuteField, QualityText, ValueField
 
 READING_COLUMNS = (
     Column("Code"),
@@ -198,6 +197,6 @@ def last_minute_field(minute: LastMinute, share: float | None) -> LastMinuteFiel
     """The last minute of a line or a drive, with its share of good replies."""
     from dataclasses import asdict
 
-    from ..documents.counter_parts import LastMinuteField
+    from ..documents.parts import LastMinuteField
 
     return LastMinuteField(share=None if share is None else round(share, 4), **asdict(minute))

@@ -15,7 +15,7 @@ from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
 from .advice import ALARM_KIND
-from .found import WATCHED_ONLY
+from .rows import WATCHED_ONLY
 from .state import LineView
 
 if TYPE_CHECKING:

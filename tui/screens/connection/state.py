@@ -24,11 +24,10 @@ from ..base import PanelScreen
 from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines, hint_for
 from .choices import LIST_MARKS, ListMark
 from .drive_list import DriveList
-from .found import about_lines
 from .line_form import LineForm
 from .line_list import LineList
 from .progress import far_text, left_text, scan_forms
-from .rows import TRUSTED_LOOKS, rows_of
+from .rows import TRUSTED_LOOKS, about_lines, rows_of
 from .wall import WallColumns, WallRow, column_heads, columns_for, heading, wall_line
 
 if TYPE_CHECKING:

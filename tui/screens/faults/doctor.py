@@ -30,12 +30,11 @@ from tui.widgets.palette import (
 )
 
 from .doctor_view import DoctorView, ValueRow
-from .history import history_rows, shown_count
 from .next_steps import check_rows, next_heading, open_row, record_row, reset_rows, written_row
 from .parts import ago_text, reading_text
 from .quiet import quiet_rows
 from .trip_curve import LEAST_ROWS, trip_curve_lines, trip_curve_width
-from .view import stored_text
+from .view import history_rows, shown_count, stored_text
 
 CODE_WIDTH = 7
 TRIP, NOW = "at the trip", "now"

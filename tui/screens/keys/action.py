@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple
 
-from tui.drive.reset_text import MAY_START
+from tui.drive.sentences import MAY_START
 
 if TYPE_CHECKING:
     from textual.screen import Screen

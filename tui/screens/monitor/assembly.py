@@ -10,10 +10,10 @@ from rich.text import Text
 from tui.drive.profile.profile import Profile, is_verified, mark_of
 from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
+from tui.screens.monitor.readouts import gauge
 from tui.session.monitor.trend import readout_parameter
 from tui.session.shown import Quality
 from tui.widgets.drawing import fitted_names, rule, short, wrapped
-from tui.widgets.gauge import gauge
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, PLAIN, STALE, STRONG, age_text
 
 from .arrange import WIDE_VALUE_COLUMN, Arrangement

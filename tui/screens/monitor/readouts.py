@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from functools import lru_cache
+from itertools import groupby
+from operator import itemgetter
 
 from rich.style import Style
 from rich.text import Text
@@ -19,12 +21,56 @@ from tui.drive.values import NOT_AVAILABLE, Value, possible_decimals
 from tui.session.monitor.trend import TREND_QUANTITIES, readout_parameter
 from tui.session.shown import Quality, Shown
 from tui.widgets.drawing import short
-from tui.widgets.gauge import gauge
-from tui.widgets.palette import BAR, BAR_REST, FAINT, LINE, PLAIN, STALE, STRONG, age_text
+from tui.widgets.palette import BAR, BAR_REST, FAINT, LINE, MARK, PLAIN, STALE, STRONG, age_text
 
 from .curves import bar_end
 from .time_axis import points_of_page
 from .view import View, bar_number, directed, end_of
+
+
+def gauge(
+    value: float | None,
+    low: float,
+    high: float,
+    width: int,
+    mark: float | None = None,
+    style: Style = BAR,
+) -> Text:
+    """A bar of exactly `width` cells, filled from zero (or the low end) to the value.
+
+    If the low end is below zero, zero has a sign of its own inside the bar.
+    """
+    inner = max(1, width - 2)
+    cells = [("─", BAR_REST)] * inner
+    if high > low:
+        zero = _halves(max(low, min(high, 0.0)), low, high, inner)
+        if value is not None:
+            end = _halves(value, low, high, inner)
+            cells = [_cell(at, min(zero, end), max(zero, end), style) for at in range(inner)]
+        if low < 0 < high and cells[at := min(inner - 1, zero // 2)][0] == "─":
+            cells[at] = ("┼", LINE)
+        if mark is not None:
+            cells[min(inner - 1, _halves(mark, low, high, inner) // 2)] = ("┃", MARK)
+    text = Text("├", LINE, no_wrap=True)
+    for item, run in groupby(cells, key=itemgetter(1)):
+        text.append("".join(character for character, _ in run), item)
+    return text.append("┤", LINE)
+
+
+def _halves(value: float, low: float, high: float, inner: int) -> int:
+    """The position of a value, in halves of a cell."""
+    return round((max(low, min(high, value)) - low) / (high - low) * inner * 2)
+
+
+def _cell(at: int, start: int, end: int, style: Style) -> tuple[str, Style]:
+    """The cell `at`; `start` and `end` of the filled part are in halves of a cell."""
+    left, right = start <= 2 * at < end, start <= 2 * at + 1 < end
+    if left and right:
+        return "━", style
+    if left or right:
+        return ("╸" if left else "╺"), style
+    return "─", BAR_REST
+
 
 ROWS = 3
 DIGIT_CELLS = 3

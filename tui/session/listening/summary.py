@@ -15,8 +15,7 @@ from tui.drive.shown import number_of
 
 from . import summary_texts as texts
 from .families import AssumedProfile, Families
-from .listener import LineListener
-from .tally import DriveTally, LineTally, WriteTally
+from .listener import DriveTally, LineListener, LineTally, WriteTally
 from .words import WordSpan, names_of_words
 
 CODES_SHOWN = 6

@@ -13,8 +13,7 @@ from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.values import is_enumeration, is_field, raw_range, word_count
 
 from .bench_motion import STOP_SECONDS, need_reset, present_scale, running_chart, start_motor
-from .proof_bench import ProofBench, Unproved
-from .proof_step import ProofStep, proof_step
+from .proof_bench import ProofBench, ProofStep, Unproved, proof_step
 
 
 def drive_steps(profile: Profile) -> Iterator[ProofStep]:

@@ -1,11 +1,16 @@
-"""A simulated drive on a bench: requests of a line to it, and time that only the test advances."""
+"""A simulated drive on a bench: requests of a line to it, and time that only the test advances.
+
+The result of a step is here, too, with the way in which it is carried out.
+"""
 
 from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
 
 from tui.drive.chart import ChartState, read_chart, state_of
+from tui.drive.errors import DriveError
 from tui.drive.orders import (
     choose,
     deciding_codes,
@@ -17,12 +22,34 @@ from tui.drive.orders import (
 )
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, State
+from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_field, to_words, word_count
 from tui.drive.words import raw_of_word
 
 from ..drive import SimulatedDrive
+from ..errors import SimulatorError
 from ..spec import DriveSpec
+
+
+@dataclass(frozen=True, slots=True)
+class ProofStep:
+    """Result of one step, and the place of its claim in the file."""
+
+    path: TomlPath
+    title: str
+    fault: str = ""
+    """Why it failed; empty if it passed."""
+
+
+def proof_step(path: TomlPath, title: str, test: Callable[[], None]) -> ProofStep:
+    """Carry out a step; an error of the drive is its fault."""
+    try:
+        test()
+    except (Unproved, DriveError, SimulatorError) as error:
+        return ProofStep(path, title, str(error) or "failed")
+    return ProofStep(path, title)
+
 
 BENCH_ADDRESS = 1
 BENCH_STEP = 0.05

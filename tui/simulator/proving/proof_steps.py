@@ -40,8 +40,7 @@ from .bench_motion import (
     trip_drive,
 )
 from .drive_steps import drive_steps
-from .proof_bench import ProofBench, Unproved
-from .proof_step import ProofStep, proof_step
+from .proof_bench import ProofBench, ProofStep, Unproved, proof_step
 
 HZ_TOLERANCE = 0.3
 SLIP_HZ = 3.0

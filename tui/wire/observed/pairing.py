@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from .lengths import REFUSAL, SAME_BOTH_WAYS, fits_reply, fits_request
-from .splitting import ObservedFrame
+from .splitting import REFUSAL, SAME_BOTH_WAYS, ObservedFrame, fits_reply, fits_request
 
 ObservedAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
 """Result of a request: `again` is a second reply, `unasked` a reply without a request."""
