@@ -11,9 +11,10 @@ import pytest
 
 from tui.bus.errors import OWNER_SILENT, NotShared
 from tui.bus.model import LineStatus
+from tui.bus.program import Program
 from tui.bus.share import client as clients
 from tui.bus.share.client import STOOD_STILL, OwnerAway, ShareClient
-from tui.bus.share.messages import Alive, NoMessage, TurnedAway, Welcome
+from tui.bus.share.messages import Alive, NoMessage, StopGiven, TurnedAway, Welcome, packed
 
 OWNER: Any = SimpleNamespace(program=SimpleNamespace(text="panel 7"), socket="/run/line")
 
@@ -162,3 +163,32 @@ def test_requests_to_a_frozen_owner_fail_once_it_cannot_be_ended(
     assert bench.it._requested.send.call_args_list == [call("a")] * 2
     assert bench.it._polls.lose_all.call_count == 2
     assert bench.it._requested.fail_all.call_args_list == ([call(text)] * 2 if remedy else [])
+
+
+@pytest.mark.parametrize(
+    ("writer", "closing", "writes"),
+    [(True, False, True), (True, True, False), (False, False, False)],
+)
+@pytest.mark.parametrize("stops", [True, False])
+def test_message_is_written_and_a_stop_awaited_while_the_connection_is_open(
+    writer: bool, closing: bool, writes: bool, stops: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    bench = Bench(monkeypatch)
+    del bench.it._tell
+    bench.it.watching = Mock()
+    bench.it.writer = to = Mock() if writer else None
+    if to is not None:
+        to.transport.is_closing.return_value = closing
+    message = StopGiven((1,), (1,), "a key", Program("a", "run")) if stops else Alive()
+    bench.it._tell(message)
+    if to is not None:
+        assert to.write.call_args_list == ([call(packed(message))] if writes else [])
+    assert bench.it.watching.note_stop.called == (writes and stops)
+
+
+@pytest.mark.internal_errors
+def test_message_that_only_a_client_sends_is_logged(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    Bench(monkeypatch).it._hear(TurnedAway("odd"))
+    assert caplog.messages == ["the owner says TurnedAway"]

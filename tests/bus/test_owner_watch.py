@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from tests.limits import HEARD_WITHIN, SILENT_OWNER, STOP_HEARD_WITHIN, TAKEN_IN_WITHIN
+from tui.bus.errors import OWNER_SILENT
 from tui.bus.model import Priority
 from tui.bus.program import KEEPER, Program
 from tui.bus.share.messages import VERSION, Alive, Asking, Notified, StopGiven
@@ -30,6 +31,7 @@ from tui.bus.share.owner_watch import (
     is_stop,
 )
 from tui.bus.share.place import Owner, Peer
+from tui.safety import AWAKE
 
 LISTENS = """
 import socket, sys
@@ -58,8 +60,8 @@ class MadeUpProcess:
 class Bench:
     """A program on a line that checks the keeper of the line as time passes."""
 
-    def __init__(self) -> None:
-        self.now = 100.0
+    def __init__(self, now: float = 100.0) -> None:
+        self.now = now
         self.process = MadeUpProcess()
         owner = Owner(VERSION, Program("k", KEEPER, 1), "socket")
         self.watch = OwnerWatch(lambda: self.now, owner)
@@ -160,6 +162,67 @@ def test_keeper_that_cannot_be_killed_is_reported_immediately(bench: Bench) -> N
     assert bench.watch.frozen
     bench.wait(HEARD_WITHIN)
     assert len(bench.process.kills) == 1
+
+
+def looks_until_frozen(bench: Bench) -> int:
+    """Count the looks at a keeper that has long been silent."""
+    looks = 0
+    while not bench.watch.frozen:
+        bench.watch.look(attached=True)
+        looks += 1
+    return looks
+
+
+@pytest.mark.internal_errors
+def test_program_without_time_to_look_takes_no_keeper_for_frozen(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Its messages may be waiting: ten looks more are needed, each time."""
+    for _ in range(2):
+        bench.now += 60.0
+        assert looks_until_frozen(bench) == round(SILENT_OWNER / WATCH_INTERVAL) + 1
+        bench.watch.hear(Alive())
+        assert not bench.watch.frozen
+    assert caplog.messages == [f"{bench.watch._owner.program.text} {OWNER_SILENT}"] * 2
+
+
+@pytest.mark.internal_errors
+def test_keeper_may_be_silent_for_exactly_its_time() -> None:
+    """The clock begins at 0, so that each time is exact."""
+    bench = Bench(0.0)
+    while bench.now < SILENT_OWNER:
+        bench.now += 0.125
+        for _ in range(4):
+            bench.watch.look(attached=True)
+    assert not bench.watch.frozen
+    while bench.now < HEARD_WITHIN:
+        bench.now += 0.125
+        bench.watch.look(attached=True)
+    assert bench.watch.frozen
+    assert not bench.process.kills
+    bench.now += 0.125
+    bench.watch.look(attached=True)
+    assert len(bench.process.kills) == 1
+
+
+@pytest.mark.internal_errors
+def test_stop_may_be_without_an_answer_for_exactly_its_time() -> None:
+    bench = Bench(0.0)
+    bench.watch.note_stop()
+    for kills, now in ((0, 0.25), (0, 0.5), (0, 0.75), (0, STOP_HEARD_WITHIN), (1, 1.125)):
+        bench.now = now
+        bench.watch.look(attached=True)
+        assert len(bench.process.kills) == kills
+
+
+def test_longest_pause_between_two_looks_is_no_suspension() -> None:
+    bench = Bench(0.0)
+    bench.now = AWAKE
+    bench.watch.look(attached=True)
+    assert bench.watch._awake == 0.0
+    bench.now = 2.5 * AWAKE
+    bench.watch.look(attached=True)
+    assert bench.watch._awake == bench.now
 
 
 def test_is_stop_is_true_for_stop_messages_only() -> None:

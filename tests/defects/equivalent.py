@@ -54,5 +54,8 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/shared_state.py:SharedState.give_stop: constant: 0.0 -> 1.0": (
         "The count of the stop, just before, has given each device its time."
     ),
+    "tui/bus/schedule/engine.py:Engine.spawn: raise: raise LineClosed -> pass": (
+        "Without a loop, `_enter` raises the same error."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""
