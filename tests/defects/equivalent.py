@@ -57,5 +57,6 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/schedule/engine.py:Engine.spawn: raise: raise LineClosed -> pass": (
         "Without a loop, `_enter` raises the same error."
     ),
+    "tui/session/carry_on.py:carried_on: return: return -> pass": ("It is the last statement."),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""
