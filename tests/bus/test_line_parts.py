@@ -31,7 +31,6 @@ from tui.bus.share.messages import (
     unpacked,
 )
 from tui.bus.trace import LOOKED_LATELY, Frame, Trace
-from tui.bus.transport import tcp
 from tui.bus.transport.tcp import TcpTransport
 
 from .conftest import WIDE
@@ -44,7 +43,7 @@ LIMITS = replace(WIDE, functions=WIDE.functions | {4})
 
 
 @pytest.fixture
-def asked() -> tuple[Line, list[Job]]:
+def answered() -> tuple[Line, list[Job]]:
     """A line whose requests are answered at 5.0, and these."""
     line, jobs = Line(TcpLink("10.0.0.5")), list[Job]()
     line.describe(1, LIMITS)
@@ -59,9 +58,9 @@ def asked() -> tuple[Line, list[Job]]:
 
 
 async def test_read_has_the_form_and_the_urgency_that_were_named(
-    asked: tuple[Line, list[Job]],
+    answered: tuple[Line, list[Job]],
 ) -> None:
-    line, jobs = asked
+    line, jobs = answered
     reply = await line.read(1, 100)
     assert (reply.words, reply.time) == ((7,), 5.0)
     await line.read(1, 101, priority=Priority.STOP, function=4, max_age=1.5, within=0.5)
@@ -75,9 +74,9 @@ async def test_read_has_the_form_and_the_urgency_that_were_named(
 
 
 async def test_write_has_the_form_and_the_urgency_that_were_named(
-    asked: tuple[Line, list[Job]],
+    answered: tuple[Line, list[Job]],
 ) -> None:
-    line, jobs = asked
+    line, jobs = answered
 
     def forbidden() -> str:
         return ""
@@ -98,9 +97,9 @@ async def test_write_has_the_form_and_the_urgency_that_were_named(
 
 
 async def test_stop_is_sent_on_a_line_that_is_held_and_nothing_on_one_that_is_read_only(
-    asked: tuple[Line, list[Job]],
+    answered: tuple[Line, list[Job]],
 ) -> None:
-    line, jobs = asked
+    line, jobs = answered
     line.held = "Is this the right line?"
     with pytest.raises(RequestRefused, match="right line"):
         await line.write(1, 8501, [7])
@@ -272,7 +271,7 @@ def test_stop_of_unequal_devices_and_counts_is_no_message() -> None:
 @pytest.fixture
 def connected(monkeypatch: pytest.MonkeyPatch) -> tuple[TcpTransport, Mock, Mock]:
     """A connection, its socket, and the receiver of its bytes."""
-    monkeypatch.setattr(tcp.time, "monotonic", lambda: 7.0)
+    monkeypatch.setattr("tui.bus.transport.tcp.time.monotonic", lambda: 7.0)
     transport, connection, receiver = TcpTransport(), Mock(), Mock()
     connection.is_closing.return_value = False
     transport._connection = connection
@@ -312,7 +311,7 @@ async def test_connection_rests_until_its_time_and_takes_in_what_has_come(
     async def sleep(seconds: float) -> None:
         slept.append(seconds)
 
-    monkeypatch.setattr(tcp.asyncio, "sleep", sleep)
+    monkeypatch.setattr("tui.bus.transport.tcp.asyncio.sleep", sleep)
     for until in (6.0, 7.0, 7.5):
         await transport.rest(until)
     assert slept == [0.5]

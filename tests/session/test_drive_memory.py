@@ -1,4 +1,4 @@
-"""What a program knows of a drive: its registers, its messages, its presence and its read plans."""
+"""A drive as a program knows it: its registers, messages, presence and read plans."""
 
 from __future__ import annotations
 
@@ -294,7 +294,7 @@ async def test_motors_of_a_program_that_has_left_are_looked_for() -> None:
 
 
 @pytest.fixture
-def plans(monkeypatch: pytest.MonkeyPatch) -> tuple[KeptPlans, Any, list[tuple[Any, ...]]]:
+def plans(monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Any, list[tuple[Any, ...]]]:
     """Plans of a drive, and what each was made of."""
     made: list[tuple[Any, ...]] = []
     session = Mock(profile=ATV71, device=3)
@@ -311,7 +311,7 @@ def plans(monkeypatch: pytest.MonkeyPatch) -> tuple[KeptPlans, Any, list[tuple[A
 
 
 def test_read_plan_is_kept_while_what_it_was_made_of_is_the_same(
-    plans: tuple[KeptPlans, Any, list[tuple[Any, ...]]],
+    plans: tuple[Any, Any, list[tuple[Any, ...]]],
 ) -> None:
     kept, session, made = plans
     codes = frozenset({"b", "a"})
@@ -337,7 +337,7 @@ def test_read_plan_is_kept_while_what_it_was_made_of_is_the_same(
 
 
 def test_read_plan_follows_the_turnaround_in_steps(
-    plans: tuple[KeptPlans, Any, list[tuple[Any, ...]]],
+    plans: tuple[Any, Any, list[tuple[Any, ...]]],
 ) -> None:
     kept, session, made = plans
     state = session.line.device_state.return_value
