@@ -286,6 +286,19 @@ def test_partial_frames_add_up_to_the_same_screen(
         assert terminal.text()[y].rstrip("?") == strip.text
 
 
+@pytest.mark.parametrize(
+    ("erases", "moves"), [(True, ["1;3"]), (False, ["1;3", "1;16", "1;31"])], ids=["erases", "not"]
+)
+def test_dots_far_apart_are_erased_by_one_command(*, erases: bool, moves: list[str]) -> None:
+    """Blanks between erased cells cost nothing, so the cursor does not have to jump over them."""
+    picture = Picture(erases=erases)
+    for text in ("| .            .              .", "|" + " " * 30):
+        picture.want([(0, 0, Strip([Segment(text)]))], ColorSystem.TRUECOLOR)
+        frame = picture.frame(WHOLE)
+    assert re.findall(r"\x1b\[(\d+;\d+)H", frame) == moves
+    assert frame.endswith("\x1b[29X" if erases else "H ")
+
+
 def test_frame_begins_with_the_status_bar_and_the_message() -> None:
     picture = Picture()
     rows = [(0, y, Strip([Segment(f"row{y}")])) for y in range(24)]

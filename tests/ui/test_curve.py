@@ -323,6 +323,25 @@ def test_low_bandwidth_refresh_at_rest_changes_only_the_curve() -> None:
     assert curve_lines(early, room)[-2:] == curve_lines(late, room)[-2:]
 
 
+def test_low_bandwidth_link_gets_no_grid() -> None:
+    room, view = arrange(80, 24, 9), running_view(1000.0, 30.0)
+    slow = replace(view, lean=True)
+    dots = [sum(line.plain.count("·") for line in curve_lines(v, room)) for v in (view, slow)]
+    assert dots[0] > 50
+    assert dots[1] == 0
+
+
+def test_no_axis_is_drawn_before_the_first_value() -> None:
+    """Its scale would be of nothing, and on a slow link it would delay the values."""
+    room, view = arrange(80, 24, 9), running_view(1000.0, 30.0)
+    nothing = tuple(replace(point, values=(None, None, None)) for point in view.trend)
+    for trend in ((), nothing):
+        heading, *rest = curve_lines(replace(view, trend=trend), room)
+        assert "output" in heading.plain
+        assert len(rest) == room.curve - 1
+        assert not any(rest)
+
+
 def test_mark_without_a_known_cause_claims_none() -> None:
     view = marked_at(running_view(1000.0), {970.0: "start"})
     room = arrange(80, 24, 9)

@@ -175,15 +175,24 @@ class Picture:
         wanted = self._wanted[y]
         shown = self._shown.setdefault(y, [])
         shown.extend([None] * (len(wanted) - len(shown)))
-        for start, end in different(shown, wanted, first, last):
+        for start, end in different(shown, wanted, first, last, erases=self._erases):
             pen.write(start, y, wanted[start:end])
         shown[first:last] = wanted[first:last]
 
 
 def different(
-    shown: Sequence[Cell | None], wanted: Sequence[Cell | None], first: int, last: int
+    shown: Sequence[Cell | None],
+    wanted: Sequence[Cell | None],
+    first: int,
+    last: int,
+    *,
+    erases: bool = False,
 ) -> list[tuple[int, int]]:
-    """The runs of cells of a row that must be sent; a wide character is sent whole."""
+    """The runs of cells of a row that must be sent; a wide character is sent whole.
+
+    If the terminal erases cells, unchanged blanks between two blanks that must be sent cost
+    nothing: one command erases them all.
+    """
     found: list[tuple[int, int]] = []
     for place in range(first, last):
         cell = wanted[place]
@@ -191,7 +200,11 @@ def different(
             continue
         start = place if cell[0] else max(0, place - 1)
         gap = wanted[found[-1][1] : start] if found else ()
-        if found and len(gap) < CURSOR_MOVE and None not in gap:
+        erased = erases and cell[0] == " " and erasable(cell[1])
+        is_near = len(gap) < CURSOR_MOVE and None not in gap
+        if found and (
+            is_near or (erased and all(same == cell for same in wanted[found[-1][1] - 1 : start]))
+        ):
             found[-1] = (found[-1][0], place + 1)
         else:
             found.append((start, place + 1))

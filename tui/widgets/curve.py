@@ -76,13 +76,14 @@ BLOCKS = CurveSigns(1, 2, " ▄▀█", " ▄▀█", "·", "│", "▄ ")
 ASCII_SIGNS = CurveSigns(1, 3, ' _-|"|||', " .=:':::", " ", "!", "= ")
 
 
-def curve_signs(*, plain: bool, braille: bool, colored: bool = True) -> CurveSigns:
+def curve_signs(*, plain: bool, braille: bool, grid: bool = True) -> CurveSigns:
     """Return the characters for a terminal; `plain` means ASCII only.
 
-    Without colors there is no grid: it would look like part of a curve.
+    A grid needs colors: without them it would look like part of a curve. It is also a third of the
+    bytes of Monitor.
     """
     signs = ASCII_SIGNS if plain else BRAILLE if braille else BLOCKS
-    return signs if colored else signs._replace(grid=" ")
+    return signs if grid else signs._replace(grid=" ")
 
 
 @dataclass(frozen=True, slots=True)

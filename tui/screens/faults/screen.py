@@ -185,7 +185,7 @@ class FaultsScreen(OrderKeys):
             signs=curve_signs(
                 plain=self.app.plain_signs,
                 braille=self.app.has_braille,
-                colored=self.app.has_colors,
+                grid=self.app.has_colors,
             ),
         )
         return replace(view, watched=self._watched()) if view.is_quiet else view

@@ -84,6 +84,10 @@ def curve_lines(view: View, room: Arrangement) -> list[Text]:
     if not found:
         nothing = Text("  No curve: no document says where output and current are.", FAINT)
         return [nothing, *[Text("")] * (room.curve - 1)]
+    if all(value is None for point in view.trend for value in point.values):
+        # before the first value, axes would have a scale of nothing, and delay the values
+        heading = _heading(view, found[0], (), room.width)
+        return [heading, *[Text("")] * (room.curve - 1)]
     columns = room.width - LABEL_CELLS - 1 - MARGIN_CELLS
     points = points_of_page(view)
     page = ShownPage(view, points, columns, marks_on_page(view, points, columns))

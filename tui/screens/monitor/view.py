@@ -91,8 +91,9 @@ class View:
 
     @property
     def signs(self) -> CurveSigns:
-        """Characters for curves that the terminal can show."""
-        return curve_signs(plain=self.plain, braille=self.braille, colored=self.colored)
+        """Characters for curves that the terminal can show; no grid on a low-bandwidth link."""
+        grid = self.colored and not self.lean
+        return curve_signs(plain=self.plain, braille=self.braille, grid=grid)
 
     @property
     def page_start(self) -> float:
