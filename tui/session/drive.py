@@ -265,6 +265,11 @@ class UnsavedSettings:
             if code in self._held:
                 self._held[code] = raw
 
+    def note_saved(self, code: str, raw: int) -> None:
+        """Note that the drive has saved this value of a setting."""
+        with self._lock:
+            self._saved[code] = raw
+
     def forget_values(self) -> None:
         """Count no value as saved from now on, because many settings may have changed."""
         with self._lock:

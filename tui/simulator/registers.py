@@ -50,6 +50,14 @@ class Registers:
             for address in _addresses(parameter):
                 self._owner.setdefault(address, parameter)
             self._store(parameter, initial[parameter.code])
+        self._copies = {
+            parameter.eeprom_address + place: address
+            for parameter in profile.parameters
+            if parameter.eeprom_address is not None
+            for place, address in enumerate(_addresses(parameter))
+        }
+        """Addresses in RAM, by those of their copies in EEPROM."""
+        self._owner |= {copy: self._owner[address] for copy, address in self._copies.items()}
         self._factory: dict[int, int] = {}
         for parameter in profile.parameters:
             _put_words(self._factory, parameter, factory[parameter.code])
@@ -65,11 +73,18 @@ class Registers:
 
     def word(self, address: int) -> int:
         """Return the present word at a known address."""
-        return self._words[address]
+        copied = self._copies.get(address)
+        return self._words[address] if copied is None else self._saved[copied]
 
     def write_word(self, address: int, word: int) -> None:
-        """Write a word from the line; storage and effect follow the profile."""
+        """Write a word from the line; storage and effect follow the profile.
+
+        A write to the copy of a setting in EEPROM sets the one in RAM, too.
+        """
         parameter = self._owner[address]
+        if (copied := self._copies.get(address)) is not None:
+            self._saved[copied] = word & 0xFFFF
+            address = copied
         self._words[address] = word & 0xFFFF
         if parameter.effective == "at-once":
             self._in_force[address] = word & 0xFFFF

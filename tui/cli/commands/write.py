@@ -216,7 +216,7 @@ async def _write(
     try:
         gate = wear_gate(journal, confirmed, messages)
         if save:
-            await refuse_frequent_save(session, gate)
+            await refuse_frequent_save(session, gate, [edit.code for edit in edits])
         done = await apply_edits(
             session, journal, edits, permit=permit, confirmed=confirmed, progress=telling, gate=gate
         )

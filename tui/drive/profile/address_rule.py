@@ -88,34 +88,43 @@ def fill_addresses(tables: Mapping[str, Any]) -> list[tuple[TomlPath, str]]:
     """Replace the rules of a profile's parameters by their addresses; return all faults by place.
 
     A parameter's own address or rule comes before that of its group, and that before that of the
-    profile.
+    profile. Rules for EEPROM addresses of a group or profile are for settings kept in RAM.
     """
-    rows, head = tables.get("parameters"), tables.get("profile")
-    groups = tables.get("groups")
+    rows = tables.get("parameters")
+    faults: list[tuple[TomlPath, str]] = []
+    for key in ("address", "eeprom_address"):
+        by_group, usual = _shared_rules(tables, key)
+        for index, row in enumerate(rows if isinstance(rows, list) else []):
+            if not isinstance(row, dict):
+                continue
+            group, rule = row.get("group"), row.get(key)
+            if key not in row and (key == "address" or _is_kept_in_ram(row)):
+                rule = (by_group.get(group) if isinstance(group, str) else None) or usual
+            number = row.get("number")
+            if not isinstance(rule, str) or not isinstance(number, str) or not _NAMES.search(rule):
+                # an address in quotes is not a rule, but a mistake that the form check reports
+                continue
+            try:
+                row[key] = address_by_rule(rule, number)
+            except RuleError as error:
+                place: TomlPath = ("parameters", index)
+                if key in row:
+                    place = (*place, key)
+                faults.append((place, f"parameter {row.get('code', number)}: {error}"))
+    return faults
+
+
+def _shared_rules(tables: Mapping[str, Any], key: str) -> tuple[dict[str, Any], Any]:
+    """Return the rules of the groups by their name, and that of the profile."""
+    head, groups = tables.get("profile"), tables.get("groups")
     by_group = {
-        row.get("name"): row.get("address")
+        row["name"]: row.get(key)
         for row in (groups if isinstance(groups, list) else [])
         if isinstance(row, dict) and isinstance(row.get("name"), str)
     }
-    usual = head.get("address") if isinstance(head, dict) else None
-    faults: list[tuple[TomlPath, str]] = []
-    for index, row in enumerate(rows if isinstance(rows, list) else []):
-        if not isinstance(row, dict):
-            continue
-        group = row.get("group")
-        rule = row.get("address") or (
-            "address" not in row
-            and ((by_group.get(group) if isinstance(group, str) else None) or usual)
-        )
-        number = row.get("number")
-        if not isinstance(rule, str) or not isinstance(number, str) or not _NAMES.search(rule):
-            # an address in quotes is not a rule, but a mistake that the form check reports
-            continue
-        try:
-            row["address"] = address_by_rule(rule, number)
-        except RuleError as error:
-            place: TomlPath = ("parameters", index)
-            if "address" in row:
-                place = (*place, "address")
-            faults.append((place, f"parameter {row.get('code', number)}: {error}"))
-    return faults
+    return by_group, head.get(key) if isinstance(head, dict) else None
+
+
+def _is_kept_in_ram(row: Mapping[str, Any]) -> bool:
+    writable = row.get("access") in ("rw", "rw-stopped")
+    return writable and row.get("storage") == "ram-until-saved"

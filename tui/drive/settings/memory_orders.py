@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import Literal
+
+import msgspec
 
 from ..errors import DriveError
 from ..profile.profile import Profile
@@ -12,6 +15,39 @@ from .writable import is_setting
 
 class MemoryRefused(DriveError):
     """The settings cannot be saved or restored over Modbus; the text gives the reason."""
+
+
+NOTHING_UNSAVED = "Nothing to save: this program has written no setting that is not in EEPROM."
+
+
+def eeprom_copy(parameter: Parameter) -> Parameter | None:
+    """Return a parameter at its EEPROM address; None if it has none."""
+    if parameter.eeprom_address is None:
+        return None
+    return msgspec.structs.replace(
+        parameter, address=parameter.eeprom_address, eeprom_address=None, storage="eeprom"
+    )
+
+
+def saved_by_address(profile: Profile, codes: Collection[str]) -> list[Parameter] | None:
+    """Return the EEPROM copies of these settings; None if the family saves by a command.
+
+    Raises MemoryRefused if none of them has one.
+    """
+    if all(parameter.eeprom_address is None for parameter in profile.parameters):
+        return None
+    found = [copy for code in sorted(codes) if (copy := eeprom_copy(profile[code])) is not None]
+    if not found:
+        raise MemoryRefused(NOTHING_UNSAVED)
+    return found
+
+
+def save_effect(profile: Profile, unsaved: Collection[str]) -> str:
+    """Return what a save does, for its question. Raises MemoryRefused if there is none."""
+    if (copies := saved_by_address(profile, unsaved)) is None:
+        return save_order(profile).does
+    names = ", ".join(copy.code for copy in copies)
+    return f"Writes the present value of {names} to the EEPROM. The motor must be stopped."
 
 
 def save_order(profile: Profile) -> MemoryOrder:

@@ -146,6 +146,8 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
     hexadecimal = f"16#{parameter.address:04X}"
     number = parameter.number if parameter.number not in (hexadecimal, parameter.code) else ""
     parts = [part for part in (number, hexadecimal, str(parameter.address)) if part]
+    if parameter.eeprom_address is not None:
+        parts.append(f"EEPROM 16#{parameter.eeprom_address:04X}")
     if raw is not None:
         staged = f" → {edit.new}" if edit is not None else ""
         word = f" = 16#{_word(edit.new if edit is not None else raw)}" if width >= 80 else ""

@@ -30,7 +30,6 @@ from .parameter_list import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
-    from tui.drive.profile.schema import MemoryOrder
 
     from ..dialogs.now import MotorStates
 
@@ -208,32 +207,35 @@ class WriteKeys(ParameterKeys):
 
     def action_save_eeprom(self) -> None:
         """Ask, then save the settings to EEPROM."""
-        from tui.drive.settings.memory_orders import save_order
+        from tui.drive.settings.memory_orders import save_effect
 
-        self._memory("Save to EEPROM?", save_order, "Save", self.editor.save)
+        unsaved = self.editor.unsaved
+        self._memory("Save to EEPROM?", lambda p: save_effect(p, unsaved), "Save", self.editor.save)
 
     def action_factory(self) -> None:
         """Ask, then restore the factory settings."""
         from tui.drive.settings.memory_orders import factory_order
 
         question = "Restore the factory settings?"
-        self._memory(question, factory_order, "Restore", self.editor.factory)
+        self._memory(
+            question, lambda profile: factory_order(profile).does, "Restore", self.editor.factory
+        )
 
     def _memory(
         self,
         question: str,
-        order_of: Callable[[Profile], MemoryOrder],
+        does: Callable[[Profile], str],
         yes: str,
         work: Callable[[int], None],
     ) -> None:
         try:
-            order = order_of(self.session.profile)
+            effect = does(self.session.profile)
         except DriveError as refused:
             self._refuse(str(refused))
             return
         if self._require_armed():
             wear = self.editor.wear_text() if work == self.editor.save else ""
-            self._ask(question, "\n".join(filter(None, (order.does, wear))), yes, "Cancel", work)
+            self._ask(question, "\n".join(filter(None, (effect, wear))), yes, "Cancel", work)
 
     def show_results(self) -> None:
         """Show once the result of each edit; if one failed, ask before writing the rest."""

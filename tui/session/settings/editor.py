@@ -206,11 +206,15 @@ class Editor:
         """
         if self.eeprom is None:
             return ""
-        if edits is None:
+        profile = self.session.profile
+        if edits is not None:
+            used = (e.code for e in edits if eeprom_use(profile, profile[e.code], e.new) == "write")
+            codes = list(used)
+        elif any(parameter.eeprom_address is not None for parameter in profile.parameters):
+            codes = sorted(self.unsaved)
+        else:
             wear = wear_of(self.session, self.eeprom, "")
             return f"EEPROM: {wear.text}" if wear.count else ""
-        profile = self.session.profile
-        codes = [e.code for e in edits if eeprom_use(profile, profile[e.code], e.new) == "write"]
         wears = {code: wear_of(self.session, self.eeprom, code) for code in codes}
         return "\n".join(
             f"EEPROM, {c}: {wear.text}" for c, wear in wears.items() if wear.is_frequent

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.profile.profile import is_verified
-from tui.drive.profile.schema import MemoryOrder
-from tui.drive.sentences import first_of
+from tui.drive.profile.schema import MemoryOrder, Parameter
+from tui.drive.sentences import counted, first_of
 from tui.drive.settings.factory import factory_is_sure, factory_raw, factory_sources, not_factory
-from tui.drive.settings.memory_orders import MemoryRefused, factory_order, save_order
+from tui.drive.settings.memory_orders import (
+    MemoryRefused,
+    eeprom_copy,
+    factory_order,
+    save_order,
+    saved_by_address,
+)
 from tui.drive.settings.writable import AT_REST, is_setting, line_setting
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words
@@ -28,8 +34,16 @@ SETTINGS_NAMED = 8
 """Number of settings that a text names at most."""
 
 
-async def refuse_frequent_save(session: DriveSession, gate: WearGate) -> None:
-    """Raise MemoryRefused if saves are so frequent that `gate` does not let one pass."""
+async def refuse_frequent_save(
+    session: DriveSession, gate: WearGate, codes: Collection[str] = ()
+) -> None:
+    """Raise MemoryRefused if saves are so frequent that `gate` does not let one pass.
+
+    `codes` are the settings to save, for a family with an EEPROM address for each.
+    """
+    for copy in filter(None, (eeprom_copy(session.profile[code]) for code in codes)):
+        if worn := await gate.refusal(session, copy, 0):
+            raise MemoryRefused(worn)
     if (order := session.profile.data.memory.save) is not None:
         parameter = session.profile[order.parameter]
         if worn := await gate.refusal(session, parameter, order.raw):
@@ -45,11 +59,45 @@ async def save_to_eeprom(
     state, too frequent, or the family needs or has no such command), DeviceException with the
     meaning of the drive's refusal, and the line's other errors.
     """
+    gate, writer = gate or WearGate(journal.eeprom), Writer(session, journal, permit)
+    if (copies := saved_by_address(session.profile, session.unsaved)) is not None:
+        return await _save_copies(writer, copies, gate)
     order = save_order(session.profile)
-    await refuse_frequent_save(session, gate or WearGate(journal.eeprom))
-    writer = Writer(session, journal, permit)
+    await refuse_frequent_save(session, gate)
     await _carry_out(writer, order, why="save to EEPROM", confirmed={order.parameter})
     return f"{session.profile.name}: the settings are saved to EEPROM."
+
+
+async def _save_copies(writer: Writer, copies: Sequence[Parameter], gate: WearGate) -> str:
+    """Write the present value of each setting to its EEPROM address, and read it back there."""
+    session = writer.session
+    if session.line.read_only:
+        raise RequestRefused("The line is read-only: nothing is written.")
+    codes = [copy.code for copy in copies]
+    await refuse_frequent_save(session, gate, codes)
+    retrying = RetryingReader(session)
+    unproved = []
+    for copy in copies:
+        # each time: another source may have started the motor in the meantime
+        await _need_rest(retrying)
+        raw = (await retrying.ask_raws([copy.code])).get(copy.code)
+        if raw is None:
+            raise MemoryRefused(
+                f"{copy.code} was not saved, because it cannot be read:"
+                f" {retrying.why_absent(copy.code)}"
+            )
+        try:
+            proved = await writer.write_parameter(copy, raw, why="save to EEPROM")
+        except DeviceException as error:
+            text = device_refusal(session.profile, copy, error, retrying.headline).rstrip(".")
+            raise DeviceException(
+                error.device, error.function, error.address, error.code, text
+            ) from error
+        session.unsaved_settings.note_saved(copy.code, raw)
+        unproved += [] if proved else [copy.code]
+    head = counted(len(codes), "saved 1 setting", "saved {count} settings")
+    proof = f"not verified: {', '.join(unproved)}" if unproved else "all verified"
+    return f"{session.profile.name}: {head} to EEPROM ({', '.join(codes)}), {proof}."
 
 
 async def factory_reset(
@@ -110,13 +158,17 @@ async def _carry_out(
     return retrying
 
 
-async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
-    """Raise MemoryRefused unless the drive is known to be at rest, and has settings to restore."""
-    state = await retrying.ask_state()
-    if state not in AT_REST:
+async def _need_rest(retrying: RetryingReader) -> None:
+    """Raise MemoryRefused unless the drive is known to be at rest."""
+    if await retrying.ask_state() not in AT_REST:
         raise MemoryRefused(
             f"Nothing was written: the drive is {retrying.headline}. Stop the motor first."
         )
+
+
+async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
+    """Raise MemoryRefused unless the drive is known to be at rest, and has settings to restore."""
+    await _need_rest(retrying)
     status = retrying.session.profile.quantity("extended_status_word")
     if order.at_rest_mask and status is not None:
         word = (await retrying.ask_raws([status.code])).get(status.code)

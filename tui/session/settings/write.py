@@ -20,6 +20,7 @@ from tui.drive.values import from_words, is_field, to_words, word_count
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
 from ..read.reader import Reader
+from ..reading import Reading
 from ..work import Permit
 
 log = logging.getLogger(__name__)
@@ -48,8 +49,8 @@ class Writer:
         read_back: bool = True,
         priority: Priority = Priority.OPERATOR_WRITE,
         within: float | None = None,
-    ) -> None:
-        """Write a raw value, read it back, and compare the bits of `check`.
+    ) -> bool:
+        """Write a raw value, read it back, and compare the bits of `check`; True if it was read.
 
         While a `replaceable` write waits, a newer one of the same parameter replaces it. The value
         is unknown from the write until it is read back. `within` is the longest wait for the reply
@@ -66,7 +67,7 @@ class Writer:
         before = session.image.get(code)
         answer, back, lost, sent = "ok", None, False, True
         refused = False
-        session.image.doubt(code)
+        self._doubt(parameter)
         try:
             await session.line.write(
                 session.device,
@@ -87,7 +88,7 @@ class Writer:
         except (RequestRefused, Superseded) as error:
             answer, sent = str(error), False
             # never sent: the value before the write is still known
-            session.image.believe(code, before)
+            self._believe(parameter, before)
             raise
         except DeviceException as error:
             answer, refused = str(error), True
@@ -115,6 +116,19 @@ class Writer:
                     raise
                 # an error of the journal must not make a stop that was sent fail
                 log.exception("a stop of device %s is not in the journal", session.device)
+        return back is not None
+
+    def _is_copy(self, parameter: Parameter) -> bool:
+        """Return True for the copy of a setting in EEPROM, whose value the image does not hold."""
+        return parameter.address != self.session.profile[parameter.code].address
+
+    def _doubt(self, parameter: Parameter) -> None:
+        if not self._is_copy(parameter):
+            self.session.image.doubt(parameter.code)
+
+    def _believe(self, parameter: Parameter, before: Reading | None) -> None:
+        if not self._is_copy(parameter):
+            self.session.image.believe(parameter.code, before)
 
     def _note_unsaved(self, parameter: Parameter, before: int | None, now: int | None) -> None:
         unsaved = self.session.unsaved_settings
@@ -126,8 +140,11 @@ class Writer:
     def complete_later(self, entry: Entry, parameter: Parameter, check: int = 0xFFFFFFFF) -> None:
         """Complete the journal entry of a write without a reply at the next read of the parameter.
 
-        It counts as taken if the bits of `check` are as written; with 0 nothing is compared.
+        It counts as taken if the bits of `check` are as written; with 0 nothing is compared. A read
+        does not show the copy of a setting in EEPROM.
         """
+        if self._is_copy(parameter):
+            return
         self.session.image.tell_once(
             parameter.code, partial(self._complete, entry, parameter, check)
         )
@@ -177,8 +194,9 @@ class Writer:
         except DeviceException:
             return None
         back = from_words(parameter, reply.words)
-        when = self.session.clock.line_time(reply.time)
-        self.session.image.confirm(parameter.code, back, when)
+        if not self._is_copy(parameter):
+            when = self.session.clock.line_time(reply.time)
+            self.session.image.confirm(parameter.code, back, when)
         return back
 
 

@@ -129,7 +129,8 @@ def _work_faults(step: GuideStep, profile: Profile) -> Iterator[tuple[str, str]]
             yield "hz", "a direction check has one reference"
         if not step.reverse and not step.remedy:
             yield "kind", "name `reverse` or `remedy`, for a motor that turns the wrong way"
-    if step.kind == "save" and profile.data.memory.save is None:
+    by_address = any(parameter.eeprom_address is not None for parameter in profile.parameters)
+    if step.kind == "save" and profile.data.memory.save is None and not by_address:
         yield "kind", f"{profile.name} has no command that saves to EEPROM"
     if step.kind == "loss" and profile.data.communication_fault is None:
         yield "kind", f"{profile.name} has no communication timeout"

@@ -10,6 +10,7 @@ from functools import partial
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.profile.toml_lines import TomlPath
+from tui.drive.settings.memory_orders import eeprom_copy
 from tui.drive.values import is_enumeration, is_field, raw_range, word_count
 
 from .bench_motion import STOP_SECONDS, need_reset, present_scale, running_chart, start_motor
@@ -87,20 +88,25 @@ def _memory(profile: Profile) -> Iterator[ProofStep]:
         return
     if memory.save is not None:
         yield proof_step(("memory", "save"), "settings are saved", partial(_save, profile, setting))
+    if (copied := _setting(profile, copied=True)) is not None:
+        at: TomlPath = ("parameters", profile.parameters.index(copied), "eeprom_address")
+        step = partial(_save_copy, profile, copied)
+        yield proof_step(at, "settings are saved at their EEPROM addresses", step)
     if memory.factory is not None and not memory.factory.groups:
         yield proof_step(
             ("memory", "factory"), "factory settings return", partial(_factory, profile, setting)
         )
 
 
-def _setting(profile: Profile) -> Parameter | None:
-    """Return a setting whose saving can be tested."""
+def _setting(profile: Profile, *, copied: bool = False) -> Parameter | None:
+    """Return a setting whose saving can be tested; if `copied`, one with an EEPROM address."""
     line = {setting.parameter for setting in profile.data.link.settings}
     for parameter in profile.parameters:
         if (
             parameter.access.startswith("rw")
             and parameter.storage in ("eeprom", "ram-until-saved")
             and parameter.factory is not None
+            and (not copied or parameter.eeprom_address is not None)
             and parameter.code not in line
             and not (parameter.forbidden or parameter.holds or parameter.resets_others)
             and not (parameter.factory_by or is_field(parameter) or word_count(parameter) == 2)
@@ -141,6 +147,22 @@ def _save(profile: Profile, setting: Parameter) -> None:
     bench.drive.power_cycle()
     if bench.read(setting) != raw:
         raise Unproved(f"{setting.code} is {bench.read(setting)} after power-up, not {raw}")
+
+
+def _save_copy(profile: Profile, setting: Parameter) -> None:
+    """Write the address in RAM, then that in EEPROM; only the second survives a power cycle."""
+    bench, copy = ProofBench(profile, None), eeprom_copy(setting)
+    assert copy is not None
+    raw = _change(bench, setting)
+    bench.drive.power_cycle()
+    if bench.read(setting) != setting.factory:
+        raise Unproved(f"{setting.code} survives a power cycle without being saved")
+    bench.write(copy, raw)
+    bench.drive.power_cycle()
+    for parameter in (setting, copy):
+        if (read := bench.read(parameter)) != raw:
+            address = parameter.address
+            raise Unproved(f"{setting.code} at {address} is {read} after power-up, not {raw}")
 
 
 def _factory(profile: Profile, setting: Parameter) -> None:

@@ -25,6 +25,46 @@ def overlaps(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             others.append(parameter)
 
 
+def eeprom_addresses(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield EEPROM addresses that another word has, or whose parameter does not keep a value."""
+    held = {
+        (address + place): parameter.code
+        for parameter in data.parameters
+        if parameter.function == 3
+        for address in (parameter.address,)
+        for place in range(2 if parameter.type.endswith("32") else 1)
+    }
+    for index, parameter in enumerate(data.parameters):
+        first = parameter.eeprom_address
+        if first is None:
+            continue
+        at: TomlPath = ("parameters", index, "eeprom_address")
+        kept = parameter.access in ("rw", "rw-stopped") and parameter.storage == "ram-until-saved"
+        if not kept or parameter.function != 3 or parameter.mask != 0xFFFF or parameter.shift:
+            yield (
+                at,
+                f"parameter {parameter.code}: an EEPROM address needs a whole word with access rw"
+                " and storage ram-until-saved.",
+            )
+        if data.memory.save is not None:
+            yield (
+                at,
+                f"parameter {parameter.code}: a family has [memory.save] or EEPROM addresses, not"
+                " both.",
+            )
+        for address in range(first, first + (2 if parameter.type.endswith("32") else 1)):
+            if (other := held.get(address)) is not None:
+                yield (
+                    at,
+                    f"parameter {parameter.code}: EEPROM address {address} also belongs to"
+                    f" {other}.",
+                )
+                break
+            held[address] = parameter.code
+        if address > 0xFFFF:
+            yield at, f"parameter {parameter.code}: its EEPROM address exceeds 65535."
+
+
 def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
     """Return why two parameters cannot share an address; empty if they can."""
     if parameter.type.endswith("32") or other.type.endswith("32"):
@@ -125,4 +165,4 @@ def sizes(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             )
 
 
-REGISTER_RULES = (whole_words, overlaps, functions, sizes)
+REGISTER_RULES = (whole_words, overlaps, eeprom_addresses, functions, sizes)

@@ -38,6 +38,8 @@ class ProfileHead(Table, frozen=True, kw_only=True):
     """Frequency at which its motor runs in the demo; absent: it is not in the demo."""
     address: str = ""
     """Rule for the wire address of parameters without one: `10 * number - 1`."""
+    eeprom_address: str = ""
+    """Rule for the EEPROM address of settings without one that are `ram-until-saved`."""
     rows_from: list[str] = []
     """Files of rows shared by several families, in the folder of this file; a row here with the
     same key contains the differences."""

@@ -203,6 +203,8 @@ class ParameterGroup(Table, frozen=True, kw_only=True):
     holds: Literal["settings", "commands", "measurements"] = "settings"
     address: str = ""
     """Rule for the wire address of its parameters without one: `256 * menu + item`."""
+    eeprom_address: str = ""
+    """Rule for the EEPROM address of its settings without one: `16#5000 + number`."""
     needs_factory: str = ""
     """A word that shows the fitted option. The group is valid only while that word has its factory
     value, and is not written otherwise."""
@@ -216,6 +218,8 @@ class Parameter(Table, frozen=True, kw_only=True):
     number: str
     """Address as the manual writes it: W9001, 16#FD00, 1.05."""
     address: WordAddress
+    eeprom_address: WordAddress | None = None
+    """Address of its copy in EEPROM; `address` is then the one in RAM. Both hold whole words."""
     function: Literal[3, 4] = 3
     """The function that reads it: 3, or 4 for an input register, which is never written."""
     type: WordType = "uint16"
