@@ -46,7 +46,17 @@ def test_public_profile_is_unproved_with_sources_and_passes(path: Path) -> None:
 def test_each_manual_is_cited_with_its_number() -> None:
     for name in ("v20", "atv320", "atv12"):
         titles = " ".join(source.title for source in library.load(name).data.sources)
-        assert re.search(r"A5E\d{8}|NVE\d{5}|BBV\d{5}", titles), name
+        assert re.search(r"A5E\d{8}|NVE\d{5}|BBV51917", titles), name
+
+
+def test_nameplate_and_ramps_of_an_altivar_312_go_to_an_altivar_320() -> None:
+    old, new = library.load("atv312"), library.load("atv320")
+    [table] = new.data.predecessors
+    pairs = [(old[code], new[other]) for code, other in table.codes.items()]
+    assert {one.code for one, _ in pairs} >= {"bFr", "HSP", "LSP", "ACC", "dEC", "ItH", "nCr"}
+    assert [(a.code, a.unit, a.address) for a, _ in pairs] == [
+        (a.code, b.unit, b.address) for a, b in pairs
+    ]
 
 
 def changed(tmp_path: Path, right: str, wrong: str) -> Path:
