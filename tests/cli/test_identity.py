@@ -107,3 +107,5 @@ def test_simulated_drive_that_does_not_identify_itself_has_the_profile_of_its_li
     family: str,
 ) -> None:
     assert json.loads(run(0, "status", f"sim:{family}", "--json"))["profile"] == family
+    stopped = json.loads(run(0, "stop", f"sim:{family}", "--json"))
+    assert (stopped["profile"], stopped["stopped"]) == (family, True)

@@ -49,12 +49,15 @@ class StopWish:
     journal: Journal
     telling: StopTelling
 
-    @property
-    def typed(self) -> str | None:
-        """The id of the profile that the user named. Raises DriveError if there is none such."""
+    def typed(self, device: int) -> str | None:
+        """Return the profile that the user named, by -p or as a simulated drive.
+
+        Raises DriveError if there is none such.
+        """
         from tui.drive.profile import library
 
-        return library.load(self.profile_id).id if self.profile_id is not None else None
+        named = self.profile_id or self.opened.profiles.get(device)
+        return library.load(named).id if named is not None else None
 
 
 async def first_stopped(wish: StopWish, device: int, before: StartRecord | None) -> StoppableDrive:
@@ -70,7 +73,7 @@ async def first_stopped(wish: StopWish, device: int, before: StartRecord | None)
     from tui.session.command.first_stop import stop_first
     from tui.session.connect.identify import DriveIdentity, identify_drive
 
-    opened, typed = wish.opened, wish.typed
+    opened, typed = wish.opened, wish.typed(device)
     families = await asyncio.to_thread(stop_profile)
     if typed is not None:
         families = families_beside(families, typed)
@@ -125,7 +128,7 @@ def _by_what_is_known(
     from tui.drive.profile import library
     from tui.session.connect.contradiction import contradiction
 
-    if (typed := wish.typed) is not None:
+    if (typed := wish.typed(identity.device)) is not None:
         own = identity.profile or typed
         if wrong := contradiction(identity, library.load(typed)):
             complain(f"{wrong} It is stopped as {library.load(own).name}.")
