@@ -9,6 +9,7 @@ from ..toml_lines import TomlPath
 from . import (
     charts,
     commands,
+    consistency,
     identification,
     limits,
     meanings,
@@ -29,6 +30,7 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     *charts.CHART_RULES,
     *commands.COMMAND_RULES,
     *meanings.MEANING_RULES,
+    *consistency.CONSISTENCY_RULES,
     *signal_paths.PATH_RULES,
     *identification.IDENTIFICATION_RULES,
 )

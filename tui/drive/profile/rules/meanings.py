@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from tui.drive.values import raw_range
 
 from ..profile_frame import FrameError, frame_contents
+from ..reference_ways import QUANTITY_OF_KIND, reference_ways
 from ..schema import Parameter, ProfileData
 from ..toml_lines import TomlPath
 
@@ -95,17 +96,15 @@ def fitting_units(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def references_usable(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Yield references that cannot be written, or whose unit is missing or of something else."""
+    """Yield references that cannot be written or found, or whose unit is missing or wrong."""
     parameters = {parameter.code: parameter for parameter in data.parameters}
-    for index, way in enumerate(data.references):
-        at: TomlPath = ("references", index)
-        feedback = parameters.get(way.feedback)
+    for index, listed in enumerate(data.references):
+        feedback = parameters.get(listed.feedback)
         if feedback is not None and feedback.access == "w":
-            yield (*at, "feedback"), f"reference: its feedback {way.feedback} cannot be read."
-        parameter = parameters.get(way.parameter)
-        if parameter is None:
-            continue
-        place = (*at, "parameter")
+            at: TomlPath = ("references", index, "feedback")
+            yield at, f"reference: its feedback {listed.feedback} cannot be read."
+    for at, way, parameter in reference_ways(data):
+        place = (*at, "parameter" if at[0] == "references" else "code")
         if parameter.access == "r" or parameter.forbidden:
             yield place, f"reference {parameter.code} cannot be written."
         elif parameter.access == "rw-stopped":
@@ -115,6 +114,13 @@ def references_usable(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             yield place, f"reference {parameter.code} has no unit. Never guess a scale."
         elif parameter.unit == wrong or parameter.unit not in (*SPEED_UNITS, "V"):
             yield place, f"reference {parameter.code} is a {way.kind} in {parameter.unit!r}."
+        quantity = QUANTITY_OF_KIND[way.kind]
+        if parameter.quantity != quantity:
+            yield (
+                place,
+                f"reference {parameter.code} has no quantity {quantity}. Without it, no command"
+                " finds the reference.",
+            )
 
 
 def time_of_timeouts(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
