@@ -6,6 +6,7 @@ from decimal import Decimal
 
 from tui.drive.orders import last_word
 from tui.drive.profile.profile import Profile
+from tui.drive.profile.reference_ways import reference_ways
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, ReferenceWay
 from tui.drive.shown import depends_on
 from tui.drive.values import raw_range
@@ -17,6 +18,15 @@ STOP_SECONDS = 30.0
 """Longest time to standstill; coasting included."""
 
 
+def first_reference(profile: Profile) -> ReferenceWay | None:
+    """Return the reference of a drive, listed or known by its quantity alone; None without one.
+
+    A word of unknown scale cannot be written in Hz, so it is none.
+    """
+    ways = reference_ways(profile.data)
+    return next((way for _, way, parameter in ways if parameter.unit), None)
+
+
 def running_chart(profile: Profile) -> Chart | None:
     """Return the first chart that the line can run."""
     charts = profile.data.charts
@@ -25,7 +35,7 @@ def running_chart(profile: Profile) -> Chart | None:
 
 def spin_motor(bench: ProofBench, id: OrderId, order: Order | None = None) -> None:
     """Run the motor; raises Unproved if it does not turn as commanded and shown."""
-    way = next(iter(bench.profile.data.references), None)
+    way = first_reference(bench.profile)
     # a sign of the reference may give the direction
     backward = id == "reverse" and way is not None and way.reverse == "negative"
     refer_motor(bench, top_hertz(bench) / (-2 if backward else 2))
@@ -133,7 +143,7 @@ def _hertz_of_one(bench: ProofBench, parameter: Parameter) -> float | None:
 
 def refer_motor(bench: ProofBench, hz: float, way: ReferenceWay | None = None) -> None:
     """Write a reference in Hz; nothing if the profile has none."""
-    way = way or next(iter(bench.profile.data.references), None)
+    way = way or first_reference(bench.profile)
     if way is None:
         return
     parameter = bench.profile[way.parameter]

@@ -11,6 +11,7 @@ from functools import partial
 from tui.drive.orders import STOP_ORDERS, optional_bits
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.profile_frame import READING, frame_contents
+from tui.drive.profile.reference_ways import reference_ways
 from tui.drive.profile.rules.charts import RUN_ORDERS
 from tui.drive.profile.schema import (
     Chart,
@@ -162,11 +163,13 @@ _LEADS: dict[str, Callable[[ProofBench], bool]] = {
 
 def _references(profile: Profile) -> Iterator[ProofStep]:
     chart = running_chart(profile)
-    for index, way in enumerate(profile.data.references if chart is not None else ()):
+    for at, way, parameter in reference_ways(profile.data) if chart is not None else ():
+        if at[0] == "parameters" and not parameter.unit:
+            continue  # its scale is learned at the drive
         feedback = _feedback(profile, way)
         name = feedback.code if feedback is not None else "the motor"
         title = f"{way.parameter} and {name} agree"
-        yield proof_step(("references", index), title, partial(_compare, profile, chart, way))
+        yield proof_step(at, title, partial(_compare, profile, chart, way))
 
 
 def _feedback(profile: Profile, way: ReferenceWay) -> Parameter | None:
