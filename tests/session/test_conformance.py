@@ -11,9 +11,11 @@ import msgspec
 import pytest
 
 from tests.session.sets_bench import Bench, bench
+from tui.bus.fake import FakeLine
 from tui.cli.derived import with_confirmed
 from tui.drive.errors import ValueRefused
 from tui.drive.family_page import SURENESS
+from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.drive.profile.evidence import (
     EvidenceError,
@@ -25,7 +27,7 @@ from tui.drive.profile.evidence import (
 )
 from tui.drive.profile.example_frames import FramePair, example_frames_of
 from tui.drive.profile.json_schema import schema_text
-from tui.drive.profile.profile import is_verified
+from tui.drive.profile.profile import is_verified, proof_text
 from tui.drive.profile.schema import (
     Confidence,
     EvidenceDrive,
@@ -36,6 +38,7 @@ from tui.drive.profile.schema import (
 )
 from tui.screens.parameters.value_text import CONFIDENCE_WORDS
 from tui.session.conformance import FROM_A_MANUAL, Conformance
+from tui.session.drive import DriveSession
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
 
@@ -172,6 +175,40 @@ def test_evidence_of_a_real_drive_proves_a_parameter_on_this_site(
     assert proved.confidence == "site"
     assert is_verified(proved)
     assert proved.source.endswith("; confirmed on ATV21H075M3X 1.2, 2026-03-01")
+
+
+def test_evidence_lifts_an_unproved_profile_for_its_values_only(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
+    library.evidence_folder().mkdir()
+    high = library.load("atv320")["HSP"]
+    known = msgspec.structs.replace(
+        evidence("confirmed", statement_of(high, ())),
+        profile="atv320",
+        findings=[
+            EvidenceFinding(
+                subject="value", name="HSP", statement=statement_of(high, ()), result="confirmed"
+            )
+        ],
+    )
+    (library.evidence_folder() / "1.json").write_text(evidence_text(known))
+    library.load.cache_clear()
+    proved = library.load("atv320")
+    library.load.cache_clear()
+    assert [p.code for p in proved.parameters if p.confidence == "site"] == ["HSP"]
+    assert proof_text(proved).startswith("this site has proved 1 of its ")
+    session = DriveSession(FakeLine({1: {}}), 1, proved)
+    with pytest.raises(OrderRefused, match=r"values and no command\. A wrong word may start"):
+        session.arming.arm()
+
+
+async def test_read_frame_of_a_profile_is_repeated() -> None:
+    with bench("ms300") as made:
+        read, written = example_frames_of(made.profile)
+        test = Conformance(made.session)
+        assert (await test.send_frame(read)).result == "confirmed"
+        assert (await test.send_frame(written)).seen == "Not sent: it writes."
 
 
 @pytest.mark.parametrize("kind", ["simulated", "unknown"])

@@ -18,7 +18,7 @@ from tui.bus.line_events import ControlDenied, DevicesStopped, LineEvent
 from tui.bus.link import label
 from tui.bus.notes import LineNote
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
-from tui.drive.profile.profile import Profile, digest_of
+from tui.drive.profile.profile import Profile, digest_of, proof_text
 
 from .arming import Arming
 from .byte_order import ByteOrder
@@ -39,8 +39,8 @@ OWN_PROFILE = "Drive Panel does not write with the profile of another drive."
 
 
 UNPROVED = (
-    "the profile of {name} is written from public documents, and no drive has confirmed it. A wrong"
-    " word may start the motor."
+    "the profile of {name} is written from public documents, and {proof}. A wrong word may start"
+    " the motor."
 )
 """Why a drive of an unproved profile is not armed, until a person confirms."""
 
@@ -117,7 +117,8 @@ class DriveSession:
 
     def bar_unconfirmed(self) -> None:
         """Allow arming, unless the profile is unproved and not confirmed."""
-        text = f"Not armed: {UNPROVED.format(name=self.profile.name)}"
+        unproved = UNPROVED.format(name=self.profile.name, proof=proof_text(self.profile))
+        text = f"Not armed: {unproved}"
         self.arming.barred = text if self.is_unconfirmed else ""
 
     def confirm_profile(self) -> None:

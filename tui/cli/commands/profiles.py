@@ -304,13 +304,27 @@ def _remark(listing: Listing) -> str:
     if listing.hidden_by is not None:
         return f"not used, {listing.hidden_by.name} has the same id"
     if listing.path.parent.name == library.PUBLIC and not listing.own:
-        return f"broken: {listing.fault}" if listing.fault else "public, unproved"
+        return f"broken: {listing.fault}" if listing.fault else _public_remark(listing)
     if not listing.own:
         return f"broken: {listing.fault}" if listing.fault else ""
     faults = [listing.fault] if listing.fault else library.faults_of(listing.path)
     if faults:
         return f"your own, broken: {faults[0].splitlines()[0]}"
     return "your own"
+
+
+def _public_remark(listing: Listing) -> str:
+    """Return that a profile is public, and what the evidence of this site has proved of it."""
+    from tui.drive.errors import ProfileError
+    from tui.drive.profile import library
+    from tui.drive.profile.profile import proof_text
+
+    if not library.evidence_folder().is_dir():
+        return "public, unproved"  # nothing else needs the whole file
+    try:
+        return f"public, unproved: {proof_text(library.load(listing.id))}"
+    except ProfileError as error:
+        return f"broken: {error}"
 
 
 def _show_wiring(profile: Profile, as_json: bool) -> None:

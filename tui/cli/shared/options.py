@@ -302,6 +302,8 @@ async def _confirm_unproved(session: DriveSession) -> None:
 
     Without one, arming is refused with the way out.
     """
+    from tui.drive.profile.profile import proof_text
+
     context = click.get_current_context(silent=True)
     if not session.is_unconfirmed or context is None or not context.params.get("arm"):
         return
@@ -312,8 +314,8 @@ async def _confirm_unproved(session: DriveSession) -> None:
             session.confirm_profile()
             return
     session.arming.barred = (
-        f"Not armed: no drive has confirmed the profile {session.profile.id}, and no person at a"
-        " terminal. For a script, make a profile of your own and prove it:"
+        f"Not armed: the profile {session.profile.id} is unproved ({proof_text(session.profile)}),"
+        " and no person at a terminal. For a script, make a profile of your own and prove it:"
         f" drivepanel profiles new NAME --from {session.profile.id}"
     )
 

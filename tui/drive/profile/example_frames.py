@@ -1,4 +1,4 @@
-"""Example frames of the manuals: requests with their replies, from `frames.json`."""
+"""Example frames: requests with their replies, from `frames.json` and from the profile itself."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def all_frames() -> list[ExampleFrame]:
 
 
 def example_frames_of(profile: Profile) -> list[FramePair]:
-    """Return the requests of the family's manual with their replies."""
+    """Return the requests of the family's manual and of the profile with their replies."""
     head = profile.data.profile
     families = {head.id, *(name.removesuffix(".rows") for name in head.rows_from)}
     pairs: list[FramePair] = []
@@ -52,4 +52,10 @@ def example_frames_of(profile: Profile) -> list[FramePair]:
         else:
             last = pairs[-1]
             pairs[-1] = FramePair(last.request, (*last.replies, frame))
+    for own in profile.data.frames:
+        sent, reply = (
+            ExampleFrame(head.id, own.source, direction, data, ", ".join(own.means))
+            for direction, data in (("request", own.sent), ("response", own.answered))
+        )
+        pairs.append(FramePair(sent, (reply,)))
     return pairs

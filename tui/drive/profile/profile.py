@@ -78,6 +78,17 @@ def is_verified(parameter: Parameter) -> bool:
     return parameter.confidence not in UNVERIFIED
 
 
+def proof_text(profile: Profile) -> str:
+    """Return, as a clause, how much of an unproved profile the evidence of this site has proved.
+
+    Evidence is about values. It proves no command.
+    """
+    proved = sum(parameter.confidence == "site" for parameter in profile.parameters)
+    if not proved:
+        return "no drive has confirmed it"
+    return f"this site has proved {proved} of its {len(profile.parameters)} values and no command"
+
+
 LONGEST_UNPACKED = 1 << 24
 """Most bytes of an unpacked profile."""
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.drive.orders import OrderRefused
+from tui.drive.profile.profile import proof_text
 from tui.session.command.commander import Commander
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
@@ -140,7 +141,7 @@ class ArmingKeys(PanelScreen):
 
         self._ask(
             f"Write to drive {self.session.device} by the unproved profile {profile.id}?",
-            "It is written from public documents, and no drive has confirmed it. A wrong word may"
+            f"It is written from public documents, and {proof_text(profile)}. A wrong word may"
             " start the motor. Try it first without a motor.",
             "Confirm",
             "Cancel",
