@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+import json
 import os
 import sys
+from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
+from tests.sources import ROOT
+from tui.cli.plant.broker import broker_of
 from tui.cli.shared.standard_streams import ForgivingFile, keep_streams, output_lost
+from tui.drive.small_file import supplied
+
+from .commands import invoked, refused
+from .test_accept import HEAD, STILL
 
 
 def pipe_without_reader() -> int:
@@ -40,3 +49,69 @@ def test_only_standard_output_reports_a_lost_reader(
     assert output_lost() == ""
     files[0].lost = OSError(28, "No space left on device")
     assert output_lost() == "No space left on device"
+
+
+# `-` in place of a file
+
+
+@pytest.fixture
+def input_once() -> Iterator[None]:
+    """Standard input is read again, and no file has the name `-`."""
+    supplied.clear()
+    yield
+    supplied.clear()
+    assert not Path("-").exists()
+
+
+@pytest.mark.usefixtures("input_once")
+def test_acceptance_test_and_password_are_read_from_standard_input(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    done = invoked("accept", "-", "sim:atv312", "--check", typed=HEAD + STILL)
+    assert (done.exit_code, done.output) == (0, "T: 1 steps. None moves the motor.\n")
+    supplied[Path("-")] = b"secret\nmore"
+    monkeypatch.setattr("tui.cli.plant.broker.need_mqtt", lambda: None)
+    assert broker_of("mqtt://me@h", Path("-")).password == "secret"
+
+
+@pytest.mark.sweep
+@pytest.mark.usefixtures("input_once")
+def test_diagram_and_evidence_are_alone_on_standard_output() -> None:
+    plan = (ROOT / "docs" / "plan" / "hall-2.toml").read_text("utf-8")
+    drawn = invoked("plan", "-", "--svg", "-", typed=plan)
+    assert drawn.exit_code == 0
+    assert drawn.stdout.startswith("<svg ")
+    assert drawn.stdout.rstrip().endswith("</svg>")
+    confirmed = invoked("profiles", "confirm", "v20", "sim:v20", "--to", "-")
+    assert json.loads(confirmed.stdout)["profile"] == "v20"
+
+
+def test_cycles_are_csv_alone_on_standard_output() -> None:
+    done = invoked("watch", "sim:v20", "SPEED", "--every", "0.2", "--count", "2", "--csv", "-")
+    head, *rows = done.stdout.splitlines()
+    assert head.startswith("time,SPEED [rpm]")
+    assert [row.split(",")[1] for row in rows] == ["0", "0"]
+
+
+@pytest.mark.parametrize(
+    ("words", "reported"),
+    [
+        (("replay", "-"), "A record is a database"),
+        (("export", "-", "RFR", "--out", "x"), "A record is a database"),
+        (("simulate", "--from", "-@1", "--pty", "x"), "A record is a database"),
+        (("watch", "sim:v20", "--csv", "-", "--json"), "both write to standard output"),
+        (("watch", "sim:v20", "--csv", "-", "--rotate", "day"), "not standard output"),
+        (("listen", "sim:v20", "--pcap", "-", "--json"), "both write to standard output"),
+    ],
+)
+def test_dash_that_is_no_file_is_refused_plainly(words: tuple[str, ...], reported: str) -> None:
+    assert reported in refused(2, *words)
+    assert not Path("-").exists()
+
+
+@pytest.mark.sweep
+def test_frames_are_alone_on_standard_output(capfdbinary: pytest.CaptureFixture[bytes]) -> None:
+    invoked("listen", "sim:atv312", "--pcap", "-", "--for", "1")
+    data = capfdbinary.readouterr().out
+    assert data.startswith(b"\x0a\x0d\x0d\x0a")
+    assert b"Listening" not in data

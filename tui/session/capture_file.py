@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
+from io import FileIO
 from pathlib import Path
 
 import tui
@@ -26,11 +27,22 @@ class CaptureFile:
     A file that is there is replaced with `force` only. Raises OSError, FileExistsError.
     """
 
-    def __init__(self, path: Path, line: str, *, raw: bool = False, force: bool = False) -> None:
+    def __init__(
+        self,
+        path: Path,
+        line: str,
+        *,
+        raw: bool = False,
+        force: bool = False,
+        output: FileIO | None = None,
+    ) -> None:
+        """`output` takes the file instead of `path`, such as standard output."""
         self.path = path
         self.packets = 0
         self._form: PacketForm = RtuForm() if raw else ModbusTcpForm()
-        self._file = path.open("wb" if force else "xb", buffering=0)
+        self._is_own = output is None
+        """True if the file has nothing but these frames, so that half a packet is cut off."""
+        self._file = output or path.open("wb" if force else "xb", buffering=0)
         self._size = 0
         try:
             self._write(section_block(f"drivepanel {tui.__version__}"))
@@ -73,6 +85,7 @@ class CaptureFile:
             if written != len(block):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError:
-            self._file.truncate(self._size)
+            if self._is_own:
+                self._file.truncate(self._size)
             raise
         self._size += len(block)

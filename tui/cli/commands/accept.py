@@ -36,6 +36,7 @@ from ..shared.options import (
 from ..shared.registration import WRITING, command
 from ..shared.say import say
 from ..shared.sets import write_down
+from ..shared.standard_streams import given_file
 
 if TYPE_CHECKING:
     from tui.session.acceptance.plan import HighSpeed
@@ -132,7 +133,7 @@ def accept(
     or another commander stops the motor and ends the test. Ends with 0 if all passed, with 1
     otherwise, with 6 if it ended early.
     """
-    test = _test_in(file)
+    test = _test_in(given_file(file))
     if check:
         for text in plan_lines(test):
             say(text)

@@ -25,7 +25,7 @@ from ..shared.output import print_json
 from ..shared.registration import command
 from ..shared.rows import Column
 from ..shared.say import say
-from ..shared.standard_streams import STANDARD
+from ..shared.standard_streams import NO_RECORD_FROM_INPUT, STANDARD
 from ..shared.times import both_times, time_typed
 
 if TYPE_CHECKING:
@@ -148,6 +148,8 @@ def export(
 
 def _recorded(source: str) -> RecordEvents:
     """The files of a record, with their events. Raises Failure if there are none."""
+    if source == str(STANDARD):
+        raise click.UsageError(NO_RECORD_FROM_INPUT)
     from tui.session.connect.recorded_line import record_files
     from tui.session.record.runs import read_events
 

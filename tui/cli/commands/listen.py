@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import time
 from collections.abc import Iterator
@@ -28,6 +29,7 @@ from ..shared.options import json_option
 from ..shared.registration import command
 from ..shared.say import say
 from ..shared.signals import interrupted_by_signal, never_suspended
+from ..shared.standard_streams import STANDARD
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -93,13 +95,16 @@ def listen(
     """
     if pcap_path is None and (raw or force):
         raise click.UsageError("--raw and --force require --pcap FILE.")
+    to_output = pcap_path == STANDARD
+    if to_output and as_json:
+        raise click.UsageError("Either --pcap - or --json: both write to standard output.")
     named = profiles_named(profile_ids)
     from tui.bus.errors import LineError
     from tui.session.connect.address_prober import known_profiles
     from tui.session.listening.background import line_to_listen
     from tui.session.listening.families import Families, remembered_families
 
-    from ..shared.listen_outputs import ListenJsonOutput, ListenTextOutput
+    from ..shared.listen_outputs import ListenJsonOutput, ListenNoOutput, ListenTextOutput
 
     with (
         never_suspended(),
@@ -107,12 +112,16 @@ def listen(
         _serial_line(line_to_listen(line_text, PROGRAM_NAME)) as place,
     ):
         families = Families(known_profiles(), named, remembered_families(place.line.link))
-        output = ListenJsonOutput(line_text, families) if as_json else ListenTextOutput(families)
+        output: ListenOutput = (
+            ListenJsonOutput(line_text, families) if as_json else ListenTextOutput(families)
+        )
+        if to_output:
+            output = ListenNoOutput()
         file = _opened_file(pcap_path, line_text, raw=raw, force=force)
         listening = HearingRun(place.line, families, output, file)
         try:
             if not as_json:
-                _say_begin(place.line.link.path, pcap_path if raw else None)
+                _say_begin(place.line.link.path, pcap_path if raw else None, err=to_output)
             place.begin()
             listening.run(seconds, every)
         except LineError:
@@ -128,7 +137,7 @@ def listen(
                 file.close()
         listening.end()
     if not as_json:
-        say(listening.text)
+        say(listening.text, err=to_output)
 
 
 @contextmanager
@@ -169,7 +178,8 @@ def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> Cap
     if path is None:
         return None
     try:
-        return CaptureFile(path, line, raw=raw, force=force)
+        output = os.fdopen(os.dup(1), "wb", buffering=0) if path == STANDARD else None
+        return CaptureFile(path, line, raw=raw, force=force, output=output)
     except FileExistsError:
         raise Failure(
             f"{path} already exists. Choose another name or use --force.", USAGE
@@ -179,13 +189,13 @@ def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> Cap
         raise Failure(text, USAGE) from error
 
 
-def _say_begin(port: str, raw_file: Path | None) -> None:
+def _say_begin(port: str, raw_file: Path | None, *, err: bool) -> None:
     from tui.wire.capture.forms import READ_RAW
 
-    say(f"Listening at {port}; nothing is sent. Ctrl-C ends it.")
+    say(f"Listening at {port}; nothing is sent. Ctrl-C ends it.", err=err)
     if raw_file is not None:
-        say("To read the file:")
-        say(READ_RAW.replace("FILE", shlex.quote(str(raw_file))), to_copy=True)
+        say("To read the file:", err=err)
+        say(READ_RAW.replace("FILE", shlex.quote(str(raw_file))), to_copy=True, err=err)
 
 
 class HearingRun:

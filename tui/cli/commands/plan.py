@@ -131,14 +131,14 @@ def plan(file: Path, svg: Path | None, scan: Path | None, as_json: bool) -> None
     if svg is not None:
         from tui.session.line_plan.drawing import diagram_svg
 
-        if svg == STANDARD:
-            raise click.UsageError("--svg needs the name of a file.")
+        if svg == STANDARD and as_json:
+            raise click.UsageError("Either --svg - or --json: both write to standard output.")
         write_down(svg, diagram_svg(found.plan, found.findings), force=True)
     if as_json:
         from ..shared.output import print_json
 
         print_json(found.document(str(file)))
-    else:
+    elif svg != STANDARD:
         for line in found.lines():
             say(line)
     if found.errors:

@@ -10,6 +10,7 @@ from ..shared.errors import USAGE, Failure
 from ..shared.line_argument import LineArgument
 from ..shared.options import SLAVE_ADDRESS, one_device
 from ..shared.registration import command
+from ..shared.standard_streams import NO_RECORD_FROM_INPUT, STANDARD
 from .panel import ascii_option, bell_option, low_bandwidth_option, mouse_option, run_panel
 
 
@@ -49,6 +50,8 @@ def replay(
     from tui.session.record.replay_text import ReplayText
 
     path = Path(source)
+    if path == STANDARD:
+        raise click.UsageError(NO_RECORD_FROM_INPUT)
     wanted = ReplayText(path.absolute() if path.exists() else path, at or "")
     text = f"{REPLAY_PREFIX}{wanted.text}"
     try:

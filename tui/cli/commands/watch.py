@@ -39,6 +39,7 @@ from ..shared.several_lines import (
     on_lines,
 )
 from ..shared.silence import silence_hint
+from ..shared.standard_streams import STANDARD
 from ..shared.watch_outputs import (
     CsvOutput,
     JsonOutput,
@@ -73,6 +74,8 @@ class CsvOptions:
             return
         if self.append and self.force:
             raise click.UsageError("Either --append or --force.")
+        if self.path == STANDARD and (self.append or self.rotate is not None):
+            raise click.UsageError("--append and --rotate require --csv FILE, not standard output.")
         refuse_unasked(self.path, append=self.append, force=self.force)
 
     def opened(self, watched: Sequence[WatchedDrive], several: LabelsNeeded) -> CsvOutput | None:
@@ -138,6 +141,8 @@ def watch(
     wishes = lines_wished(target, more)
     wish = CsvOptions(csv_path, append, force, rotate)
     wish.check()
+    if as_json and csv_path == STANDARD:
+        raise click.UsageError("Either --csv - or --json: both write to standard output.")
     seen = CyclesSeen()
 
     async def work(lines: Sequence[OpenLine]) -> None:
@@ -149,11 +154,11 @@ def watch(
             check_rate(opened.line.link, every, len(item.on(opened)))
         several = LabelsNeeded(lines=len(wishes) > 1, drives=drives > 1)
         with ExitStack() as stack:
-            outputs: list[Output] = [
-                JsonOutput(several)
-                if as_json
-                else stack.enter_context(text_output(watched, several))
-            ]
+            outputs: list[Output] = []
+            if as_json:
+                outputs.append(JsonOutput(several))
+            elif csv_path != STANDARD:
+                outputs.append(stack.enter_context(text_output(watched, several)))
             if (csv_output := wish.opened(watched, several)) is not None:
                 outputs.append(csv_output)
             await asyncio.gather(

@@ -13,6 +13,7 @@ from urllib.parse import unquote, urlsplit
 import click
 
 from ..shared.errors import USAGE, Failure
+from ..shared.standard_streams import given_file
 
 PASSWORD_SETTING = "DRIVEPANEL_MQTT_PASSWORD"
 """Environment variable with the password for the broker."""
@@ -42,7 +43,7 @@ class Broker(NamedTuple):
 mqtt_password_option = click.option(
     "--mqtt-password-file",
     "password_file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    type=click.Path(exists=True, dir_okay=False, allow_dash=True, path_type=Path),
     metavar="FILE",
     help="Read the broker password from the first line of a file.",
 )
@@ -82,7 +83,7 @@ def _password(file: Path | None) -> str | None:
     if file is None:
         return os.environ.get(PASSWORD_SETTING) or None
     try:
-        return read_small_text(file).partition("\n")[0].rstrip("\r")
+        return read_small_text(given_file(file)).partition("\n")[0].rstrip("\r")
     except (OSError, UnicodeDecodeError) as error:
         raise click.UsageError(f"{file}: the password cannot be read: {error}.") from error
 

@@ -24,6 +24,7 @@ from ..documents.other_documents import (
 )
 from ..shared.output import json_text
 from ..shared.say import say_beside
+from ..shared.standard_streams import given_file
 
 if TYPE_CHECKING:
     from tui.simulator import Bench, BenchResult
@@ -123,7 +124,7 @@ def script_lines(bench: Bench, path: str) -> list[str]:
     from tui.simulator import SimulatorError
 
     try:
-        text = read_small_text(Path(path))
+        text = read_small_text(given_file(Path(path)))
     except OSError as error:
         raise click.UsageError(f"{path} cannot be read: {error.strerror or error}.") from None
     found = []

@@ -17,6 +17,7 @@ from ..shared.options import Target, on_line
 from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.sets import counter, write_down
+from ..shared.standard_streams import STANDARD
 from .asking import may_ask, says_yes, typed_answer
 
 if TYPE_CHECKING:
@@ -60,12 +61,13 @@ def confirm_profile(
         if file is None and kind != "drive":
             path = Path(f"{session.profile.id}-{now}.json")
         if not as_json:
-            _say_findings(evidence)  # before the disk can refuse the file
+            # before the disk can refuse the file; beside the evidence on standard output
+            _say_findings(evidence, err=path == STANDARD)
         await asyncio.to_thread(_write, path, evidence, force=force)
         if as_json:
             print_json(_document(evidence, path))
         else:
-            _say_result(evidence, path)
+            _say_result(evidence, path, err=path == STANDARD)
         return DIFFERENT if evidence.count("contradicted") else DONE
 
     return on_line(target, work, read_only=True)
@@ -164,7 +166,7 @@ def _document(evidence: ProfileEvidence, path: Path) -> ConfirmDocument:
     )
 
 
-def _say_findings(evidence: ProfileEvidence) -> None:
+def _say_findings(evidence: ProfileEvidence, *, err: bool) -> None:
     """Show the findings, without the addresses that only answered."""
     for result in ("contradicted", "confirmed", "open"):
         found = [f for f in evidence.findings if f.result == result]
@@ -174,19 +176,20 @@ def _say_findings(evidence: ProfileEvidence) -> None:
             name = finding.name
             if finding.subject == "frame":
                 name = f"{name}, {finding.statement.partition(' ')[0]}"
-            say(f"{result:<12}  {finding.subject} {name}: {finding.seen}", indent=14)
+            say(f"{result:<12}  {finding.subject} {name}: {finding.seen}", indent=14, err=err)
         if len(found) > LISTED:
-            say(f"{result:<12}  and {len(found) - LISTED} more in the file")
+            say(f"{result:<12}  and {len(found) - LISTED} more in the file", err=err)
 
 
-def _say_result(evidence: ProfileEvidence, path: Path) -> None:
+def _say_result(evidence: ProfileEvidence, path: Path, *, err: bool) -> None:
     say(
         f"{evidence.count('confirmed')} confirmed, {evidence.count('contradicted')} contradicted,"
-        f" {evidence.count('open')} open. Evidence: {path}"
+        f" {evidence.count('open')} open. Evidence: {path}",
+        err=err,
     )
     proved = sum(f.subject == "value" and f.result == "confirmed" for f in evidence.findings)
     if evidence.tested.kind != "drive":
-        say("It proves nothing: no person has said that this is a real drive.")
+        say("It proves nothing: no person has said that this is a real drive.", err=err)
     elif proved:
         texts = ("1 value is proved on this site.", "{count} values are proved on this site.")
-        say(counted(proved, *texts))
+        say(counted(proved, *texts), err=err)

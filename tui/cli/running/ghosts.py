@@ -10,6 +10,7 @@ import click
 from ..documents.other_documents import GhostDocument, GhostField
 from ..shared.output import iso_time, json_text
 from ..shared.say import say_beside
+from ..shared.standard_streams import NO_RECORD_FROM_INPUT, STANDARD
 
 if TYPE_CHECKING:
     from tui.session.record.ghost import GhostRecord
@@ -22,6 +23,8 @@ def ghosts_of(texts: Sequence[str]) -> list[GhostRecord]:
     from tui.session.record.ghost import GhostError, read_recorded
 
     try:
+        if any(text.startswith(f"{STANDARD}@") for text in texts):
+            raise click.UsageError(NO_RECORD_FROM_INPUT)
         return [read_recorded(text) for text in texts]
     except GhostError as error:
         raise click.UsageError(str(error)) from None

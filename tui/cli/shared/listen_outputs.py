@@ -41,6 +41,16 @@ class ListenOutput(Protocol):
         """Put a summary out."""
 
 
+class ListenNoOutput:
+    """Prints nothing: standard output takes the frames."""
+
+    def exchange(self, reported: DecodedExchange, wall: float) -> None:
+        """Print nothing."""
+
+    def summary(self, summary: ListeningSummary, wall: float) -> None:
+        """Print nothing."""
+
+
 class ListenTextOutput:
     """Readable text: a line an exchange."""
 

@@ -69,6 +69,11 @@ def output_lost() -> str:
     return "" if lost is None else lost.strerror or str(lost)
 
 
+NO_RECORD_FROM_INPUT = (
+    "A record is a database, which is read at any place: it needs a FILE, not standard input."
+)
+
+
 def given_file(path: Path) -> Path:
     """Return the path of a file to read; with `-`, standard input is read now."""
     from tui.drive.small_file import LONGEST_TEXT, supplied

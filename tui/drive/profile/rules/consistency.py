@@ -10,7 +10,7 @@ from ..schema import Parameter, ProfileData, StatusBit
 from ..toml_lines import TomlPath
 from .meanings import QUANTITY_UNITS, SPEED_UNITS
 
-MEASURED = frozenset(
+MEASURED_QUANTITIES = frozenset(
     {"output_frequency", "speed", "motor_current", "torque", "power", "motor_voltage", "dc_bus"}
     | {"mains_voltage", "ramp_output", "run_hours", "power_on_hours", "drive_thermal"}
 )
@@ -19,7 +19,7 @@ SHORTEST_PREFIX = 3
 
 
 def full_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Yield empty names, a predecessor that is no other family, and prefixes that fit any drive."""
+    """Yield empty names, a family that replaces itself, and prefixes that fit any drive."""
     for index, parameter in enumerate(data.parameters):
         for key in ("name", "number"):
             if not getattr(parameter, key).strip():
@@ -117,7 +117,7 @@ def settings_of_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 f"parameter {parameter.code}: each command or reference would be written to"
                 " EEPROM. Use the address in RAM.",
             )
-        if parameter.quantity in MEASURED and parameter.access != "r":
+        if parameter.quantity in MEASURED_QUANTITIES and parameter.access != "r":
             yield (
                 (*at, "access"),
                 f"parameter {parameter.code}: {parameter.quantity} is measured by the drive:"
@@ -196,7 +196,10 @@ def factory_line(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         at: TomlPath = ("link", "settings", index)
         known = setting.role in ("baud", "format") and setting.choices
         if known and setting.factory is not None and not chosen:
-            yield (*at, "factory"), f"{setting.parameter}: {setting.factory} is no choice of it."
+            yield (
+                (*at, "factory"),
+                f"{setting.parameter}: {setting.factory} is not among its choices.",
+            )
         for choice in chosen:
             if choice.baud not in (None, link.baud) or choice.format not in (None, link.format):
                 yield (
