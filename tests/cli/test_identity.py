@@ -102,7 +102,7 @@ def test_absent_drive_exits_with_3() -> None:
         refused(3, "read", line, "10.40", "-p", "powerdrive", "-d", "9")
 
 
-@pytest.mark.parametrize("family", ["powerdrive", "v20"])
+@pytest.mark.parametrize("family", ["powerdrive", "ms300"])
 def test_simulated_drive_that_does_not_identify_itself_has_the_profile_of_its_line(
     family: str,
 ) -> None:

@@ -13,6 +13,10 @@ COMMUNICATION_WORDS: tuple[Quantity, ...] = (
 
 
 def communication_words(profile: Profile) -> dict[Quantity, Parameter]:
-    """Return the command and status words that a family has."""
+    """Return the command and status words of a family that can be read."""
     found = ((quantity, profile.quantity(quantity)) for quantity in COMMUNICATION_WORDS)
-    return {quantity: parameter for quantity, parameter in found if parameter is not None}
+    return {
+        quantity: parameter
+        for quantity, parameter in found
+        if parameter is not None and parameter.access != "w"
+    }
