@@ -93,6 +93,8 @@ class Body:
     """True if an input forces local control; the timeout is then not monitored."""
     alarms: int = 0
     """Alarm bits set by `alarm`, in addition to those that the motor itself raises."""
+    seconds: float = 0.0
+    """Time of the drive, since it was made."""
     saving: float = 0.0
     """Remaining time in s of an EEPROM save; nothing can be written until it ends."""
     line_orders: LineOrders = field(default_factory=LineOrders)

@@ -249,6 +249,7 @@ class SimulatedDrive:
         """Let `dt` seconds pass."""
         with self._lock:
             body = self._body
+            body.seconds += dt
             if not body.powered:
                 body.motor = step(body.motor, body.rating, MotorDemand(), self._shaft(), 0.0, dt)
                 return

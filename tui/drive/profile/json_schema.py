@@ -68,6 +68,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "id": "Command that the words carry out.",
         "words": "Words written in sequence.",
     },
+    "OrderWait": {"states": "States of which one must be reached before the next word."},
     "Interlock": {"remedy": "Remedy, as a sentence."},
     "OptionChoice": {"bits": "Masked bits of the option."},
     "CommandOption": {

@@ -6,27 +6,31 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from tui.bus.api import Priority
+from tui.bus.errors import DeviceException, ExchangeError, LineError
 from tui.drive.chart import state_codes, state_now
 from tui.drive.command_blocked import blocked_reason
+from tui.drive.errors import DriveError
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
     deciding_codes,
     interlock_codes,
     order_target,
+    stop_in_any,
     with_options,
 )
-from tui.drive.profile.schema import Chart, Order, OrderId, State
+from tui.drive.profile.schema import Chart, Order, OrderId, OrderWait, State
+from tui.drive.sentences import any_of, sentence
 from tui.drive.values import hexadecimal
 from tui.drive.words import raw_of_word
-from tui.safety import STEP_TIME
+from tui.safety import STEP_TIME, STOP_TRIES
 
 from ..drive import DriveSession
 from ..read.order_check import check_byte_order
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
-from ..work import Permit
+from ..work import Permit, Stopped
 from .reference import Reference
 from .unblock_hint import block_reason_text
 
@@ -36,8 +40,16 @@ NO_CHART = (
 STATE_POLL_INTERVAL = 0.05
 
 
+NOT_STOPPED_AFTER: frozenset[OrderId] = frozenset({"take-control", "hand-back"})
+"""Commands that move no motor; one that runs by another source must not stop."""
+
+
 class NotFollowed(OrderRefused):
     """A command was sent, but the drive did not reach its state."""
+
+
+class HalfSent(NotFollowed):
+    """A command of several words ended before its last one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +103,11 @@ class CommandAccess(Writer):
         await self.read(state_codes(self.session.profile, chart))
         return state_now(self.session.profile, chart, self.raws)
 
-    async def wait_for(self, chart: Chart, goals: Collection[str]) -> State:
-        """Read the state until it is one of the goals, for STEP_TIME at most; return the last."""
-        end = self.session.clock.monotonic() + STEP_TIME
+    async def wait_for(
+        self, chart: Chart, goals: Collection[str], seconds: float = STEP_TIME
+    ) -> State:
+        """Read the state until it is one of the goals, for so long at most; return the last."""
+        end = self.session.clock.monotonic() + seconds
         state = await self.state(chart)
         while state.id not in goals and self.session.clock.monotonic() < end:
             await self.session.clock.sleep(STATE_POLL_INTERVAL)
@@ -101,13 +115,66 @@ class CommandAccess(Writer):
         return state
 
     async def send(self, chart: Chart, order: Order) -> None:
-        """Write the words of a command in their order."""
-        parameter = order_target(self.session.profile, chart, order)
-        for word in with_options(chart, order, self.raws):
-            if parameter.code == chart.command:
-                await self.write_command(chart, word, order.name)
+        """Write the words of a command in their order, with its waits.
+
+        Raises HalfSent if a sequence ends after its first word: the drive was sent a stop then.
+        """
+        parameter, sent = order_target(self.session.profile, chart, order), 0
+        try:
+            for place, word in enumerate(with_options(chart, order, self.raws)):
+                sent = place
+                if parameter.code == chart.command:
+                    await self.write_command(chart, word, order.name)
+                else:
+                    raw = raw_of_word(parameter, word)
+                    await self.write_parameter(parameter, raw, why=order.name)
+                sent = place + 1
+                if place < len(order.waits):
+                    await self._wait(chart, order.waits[place])
+        except (LineError, DriveError) as error:
+            # without a valid reply, the drive may have taken the word
+            unsure = isinstance(error, ExchangeError) and not isinstance(error, DeviceException)
+            if isinstance(error, Stopped) or not order.waits or not (sent or unsure):
+                raise
+            ended = f"{order.name} ended after word {max(sent, 1)} of {len(order.words)}."
+            parts = (ended, sentence(str(error)), await self._stop_half(order))
+            raise HalfSent(" ".join(filter(None, parts))) from error
+
+    async def _wait(self, chart: Chart, wait: OrderWait) -> None:
+        """Wait before the next word of a command. Raises NotFollowed, and the line's errors."""
+        if not wait.states:
+            await self.session.clock.sleep(wait.seconds)
+            return
+        state = await self.wait_for(chart, wait.states, wait.seconds)
+        if state.id not in wait.states:
+            wanted = any_of([s.name for s in chart.states if s.id in wait.states])
+            raise NotFollowed(
+                f"The drive did not reach {wanted} in {wait.seconds:g} s; it is in {state.name}."
+            )
+
+    async def _stop_half(self, order: Order) -> str:
+        """Stop a drive after a half-sent command, armed or not; return the result as text."""
+        if order.id in NOT_STOPPED_AFTER:
+            return ""
+        profile, writer = self.session.profile, Writer(self.session, self.journal, None)
+        error: Exception | None = None
+        for _ in range(STOP_TRIES):
+            try:
+                chart, stop = stop_in_any(profile, self.raws)
+                target = order_target(profile, chart, stop)
+                for word in with_options(chart, stop, self.raws):
+                    raw, why = raw_of_word(target, word), f"{stop.name} after half of {order.name}"
+                    await writer.write_parameter(
+                        target, raw, why=why, priority=Priority.STOP, read_back=False
+                    )
+            except (LineError, DriveError) as failure:
+                error = failure
             else:
-                await self.write_parameter(parameter, raw_of_word(parameter, word), why=order.name)
+                self.given.forget_words()
+                return (
+                    f"The drive was sent its stop ({stop.name}). Check that the motor has stopped."
+                )
+        return f"Its stop failed: {sentence(str(error))} The motor may run. Press Space."
 
     async def write_command(self, chart: Chart, word: int, why: str) -> None:
         """Write a command word, and poll it from then on."""

@@ -52,7 +52,7 @@ class OwnChart:
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self._orders = OwnOrders(body.profile, self._raws)
+        self._orders = OwnOrders(body.profile, self._raws, lambda: body.seconds)
         self._reference = OwnReference(body)
         self._stop = Stop.RAMP
         self._runs = False

@@ -10,18 +10,24 @@ from tui.drive.profile.schema import Chart, Order, Parameter, State, Transition
 from tui.drive.words import unsigned
 
 Raws = Callable[[], Mapping[str, int]]
+TIME_STEP = 0.05
+"""Seconds by which the drive's time may lag behind that of the line."""
 
 
 class OwnOrders:
     """Follower of the words that the line writes; reports the commands that they complete.
 
     Bits of options are ignored in every comparison. A command of several words is complete with the
-    last of them, if it began in a state that allows it.
+    last of them, if it began in a state that allows it, and if its waits were kept.
     """
 
-    def __init__(self, profile: Profile, raws: Raws) -> None:
+    def __init__(self, profile: Profile, raws: Raws, seconds: Callable[[], float]) -> None:
+        """`seconds` returns the drive's time."""
         self._profile = profile
         self._raws = raws
+        self._seconds = seconds
+        self._came: dict[int, float] = {}
+        """Time of the last received word of a command, by its place in the chart."""
         self._places: dict[int, int] = {}
         """Number of received words of a command, by its place in the chart."""
         self._last: dict[str, int] = {}
@@ -61,13 +67,25 @@ class OwnOrders:
                 continue
             if not all(raws.get(when.parameter) in when.values for when in order.when):
                 continue
+            if come and not self._waited(order, come, place, state):
+                come = 0
             come = self._next(chart, where, raw, order, come)
             self._places[place] = come % len(order.words)
+            self._came[place] = self._seconds()
             if come == len(order.words) and (done is None or come > len(done.words)):
                 done = order
         if done is not None and locked_by(chart, done.id, raws) is not None:
             return None
         return done
+
+    def _waited(self, order: Order, come: int, place: int, state: State) -> bool:
+        """Return True if the wait before the next word of a command is over."""
+        if come > len(order.waits):
+            return True
+        wait = order.waits[come - 1]
+        if wait.states:
+            return state.id in wait.states
+        return self._seconds() - self._came[place] >= wait.seconds - TIME_STEP
 
     def _next(self, chart: Chart, where: Parameter, raw: int, order: Order, come: int) -> int:
         if self._same(chart, where, raw, order.words[come]):

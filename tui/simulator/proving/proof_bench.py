@@ -21,8 +21,9 @@ from tui.drive.orders import (
     with_options,
 )
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, State
+from tui.drive.profile.schema import Chart, Order, OrderId, OrderWait, Parameter, State
 from tui.drive.profile.toml_lines import TomlPath
+from tui.drive.sentences import any_of
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_field, to_words, word_count
 from tui.drive.words import raw_of_word
@@ -168,10 +169,19 @@ class ProofBench:
             raise Unproved(f"an interlock blocks it: {lock.text}")
         chosen = choose(self.chart, id, known, self.own()) if order is None else order
         target = order_target(self.profile, self.chart, chosen)
-        for word in with_options(self.chart, chosen, known):
+        for place, word in enumerate(with_options(self.chart, chosen, known)):
             self.write(target, raw_of_word(target, word))
+            if place < len(chosen.waits):
+                self._wait_between(chosen.waits[place])
         self._look()
         return chosen
+
+    def _wait_between(self, wait: OrderWait) -> None:
+        """Wait as before the next word of a command; raises Unproved."""
+        reached = self.until(lambda: self.own().id in wait.states, wait.seconds)
+        if wait.states and not reached:
+            wanted, own = any_of(wait.states), self.own().id
+            raise Unproved(f"the drive does not show {wanted} before the next word, but {own}")
 
     # Time
 

@@ -6,12 +6,14 @@ from collections.abc import Iterator
 
 from tui.drive.words import type_bits
 
-from ..schema import Chart, Parameter, ProfileData, When
+from ..schema import Chart, Order, Parameter, ProfileData, When
 from ..toml_lines import TomlPath
 
 RUN_ORDERS = frozenset({"forward", "reverse"})
 SURE_STOPS = ("stop", "quick-stop", "freewheel")
 """Orders that bring a motor to standstill in any family."""
+LONGEST_SEQUENCE = 10.0
+"""Seconds that the waits of one command may take together."""
 NOT_TURNING = frozenset({"blocked", "ready", "stopped"})
 
 
@@ -33,6 +35,8 @@ def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             for state in order.states:
                 if state not in ids:
                     yield here, f"order {order.id}: there is no state {state!r}; {known}"
+            if fault := _waits_fault(chart, order):
+                yield here, f"order {order.id}: {fault}"
             if not order.words or not (order.parameter or chart.command):
                 yield (
                     here,
@@ -46,6 +50,26 @@ def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 (*at, "runs_in"),
                 f"chart {chart.id}: runs_in {chart.runs_in!r} is not a state of the kind running.",
             )
+
+
+def _waits_fault(chart: Chart, order: Order) -> str:
+    """Return why the waits of a command are refused; empty if they are right."""
+    if not order.waits:
+        return ""
+    if order.id in (*SURE_STOPS, "emergency-stop"):
+        return "a stop never waits. Delete its waits."
+    if order.id in RUN_ORDERS and chart.runs_in is not None:
+        return "its start follows the transitions and waits for each state. Delete its waits."
+    if len(order.waits) >= len(order.words):
+        waits, words = len(order.waits), len(order.words)
+        return f"it has {waits} waits and {words} words. Waits are between words."
+    ids = [state.id for state in chart.states]
+    for state in (state for wait in order.waits for state in wait.states if state not in ids):
+        return f"there is no state {state!r} to wait for; there are: {', '.join(ids)}."
+    total = sum(wait.seconds for wait in order.waits)
+    if total > LONGEST_SEQUENCE:
+        return f"its waits take {total:g} s. Allowed are {LONGEST_SEQUENCE:g} s for one command."
+    return ""
 
 
 def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:

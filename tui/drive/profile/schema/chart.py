@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from tui.safety import STEP_TIME
+
 from .base import (
     CommandBits,
     Confidence,
@@ -86,6 +88,22 @@ OrderId = Literal[
 ]
 
 
+class OrderWait(Table, frozen=True, kw_only=True):
+    """A wait after a word of a command, before its next word."""
+
+    states: list[Identifier] = []
+    """States of which one must be reached; empty: only the time passes."""
+    ms: Annotated[int, Meta(ge=0, le=5000)] | None = None
+    """Milliseconds to wait, with `states` at most (default: 2000)."""
+
+    @property
+    def seconds(self) -> float:
+        """The wait in seconds; the longest one if it is for a state."""
+        if self.ms is None:
+            return STEP_TIME if self.states else 0.0
+        return self.ms / 1000
+
+
 class Order(Table, frozen=True, kw_only=True):
     """Command to a drive, as words that are written in sequence.
 
@@ -95,6 +113,8 @@ class Order(Table, frozen=True, kw_only=True):
     id: OrderId
     name: str
     words: list[CommandBits]
+    waits: list[OrderWait] = []
+    """Waits between the words: the first one after the first word."""
     parameter: str = ""
     """Register of the words; empty: the chart's command word."""
     states: list[Identifier] = []
