@@ -505,7 +505,8 @@ async def test_request_is_held_back_at_the_last_moment(
 
 
 @pytest.mark.parametrize(
-    ("keeps_alive", "skip", "mistakable"), [(True, 2, True), (True, 0, False), (False, 2, False)]
+    ("keeps_alive", "skip", "mistakable"),
+    [(True, 2, True), (True, 1, True), (True, 0, False), (False, 2, False)],
 )
 def test_keep_alive_read_does_not_wait_for_the_second_of_two_replies(
     keeps_alive: bool, skip: int, mistakable: bool

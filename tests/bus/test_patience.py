@@ -11,7 +11,15 @@ import pytest
 from tui.bus.master import Piece
 from tui.bus.model import Priority, Timing
 from tui.bus.requests import Read, WriteMany, WriteOne
-from tui.bus.schedule.device_record import Outstanding, judge_guess, known_before
+from tui.bus.schedule.device_record import (
+    TURNAROUNDS_KEPT,
+    Device,
+    Guess,
+    Outstanding,
+    judge_guess,
+    known_before,
+    note_turnaround,
+)
 from tui.bus.schedule.patience import (
     LONG_MEMORY,
     SHORT_MEMORY,
@@ -364,6 +372,40 @@ def test_usual_turnaround_is_the_median_of_reads() -> None:
     copied = devices()
     copied.copy(1, found)
     assert copied.state(1).usual_turnaround == 0.25
+
+
+def test_device_is_timed_by_its_last_turnarounds() -> None:
+    record = Device()
+    for turnaround in (4.0, *([0.5] * TURNAROUNDS_KEPT)):
+        note_turnaround(record, READ.function, turnaround)
+    assert record.turnaround == 0.5
+    assert len(record.recent[READ.function]) == TURNAROUNDS_KEPT
+
+
+def test_only_a_reply_that_never_came_is_remembered_as_missed() -> None:
+    made = devices()
+    over, due = (Outstanding(ONE, 10.0, 10.5, expires) for expires in (12.0, 12.5))
+    made[1].outstanding = [over, replace(over, copy=True), due]
+    made.doubts(1, TWO, 12.0)
+    assert made[1].outstanding == [due]
+    assert list(made[1].missed) == [over]
+
+
+def test_guess_keeps_each_fact_that_it_may_restore() -> None:
+    record = Device(lateness=1.0, settle=2.0, repeated=3.0)
+    record.outstanding = [Outstanding(ONE, 10.0, 10.5, 12.0)]
+    guess = known_before(record, 11.0)
+    assert guess == Guess(11.0, tuple(record.outstanding), 1.0, 2.0, 3.0)
+
+
+def test_guess_was_right_if_only_copies_or_other_replies_may_come() -> None:
+    """Neither is the reply to the request of the guess."""
+    own = Outstanding(ONE, 11.0, 11.5, 14.0)
+    for late in (replace(own, copy=True), replace(own, sent=10.5)):
+        record = Device(lateness=1.0, outstanding=[late])
+        record.guess = Guess(11.0, (), 0.0, 0.0, 0.0)
+        judge_guess(record, 12.0, 12.5)
+        assert (record.lateness, record.outstanding) == (1.0, [late])
 
 
 # -- a frame that was taken for an earlier reply ---------------------------------------------------

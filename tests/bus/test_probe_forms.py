@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, cast
 
 import pytest
 
 from tui.bus.master import ExchangeResult, ResultKind
 from tui.bus.requests import Read
-from tui.bus.schedule.probes import Forms
+from tui.bus.schedule.probes import LOOKED_BACK, REMEMBERED, Forms, Probes
 
 from .conftest import WIDE
 
@@ -104,3 +105,31 @@ def test_failures_of_4096_reads_are_remembered_at_most(forms: Timed) -> None:
     forms.note(Read(3, 1, 3), ExchangeResult(ResultKind.EXCEPTION))
     assert forms.counts() == list(range(3, 11))
     assert 3 not in forms.counts(Read(3, 1, 2))
+
+
+@pytest.mark.parametrize("kept", [REMEMBERED - 1, REMEMBERED])
+def test_so_many_failures_are_remembered_and_no_more(forms: Timed, kept: int) -> None:
+    forms._refused = {replace(OWN, address=address) for address in range(1000, 999 + kept)}
+    forms.ends(9, ResultKind.NOTHING)
+    assert len(forms._refused) == kept - 1
+    forms.ends(5, ResultKind.EXCEPTION)
+    assert len(forms._refused) == (kept if kept < REMEMBERED else 1)
+    assert len(forms._silences) == (1 if kept < REMEMBERED else 0)
+
+
+@pytest.mark.parametrize("gateway", [False, True])
+def test_probe_is_unlike_the_last_requests_to_its_drive_or_gateway(gateway: bool) -> None:
+    """Behind a gateway a reply has the address of its request, also if another drive replied."""
+    probes = Probes(cast(Any, None), lambda: 0.0, gateway=gateway)
+    first, second = probes.sent(1), probes.sent(2)
+    assert (first is second) == gateway
+    assert probes.sent(1) is first
+    first.extend(replace(OWN, count=count).expectation() for count in range(1, 9))
+    assert len(first) == LOOKED_BACK
+    reads = [replace(OWN, count=2), replace(OWN, count=3), replace(OWN, device=2, count=2)]
+    for read in reads:
+        probes.note_good(read)
+    probes.note_good(newer := replace(OWN, address=200))
+    assert probes._good == {1: {2: newer, 3: reads[1]}, 2: {2: reads[2]}}
+    probes.forget_sent()
+    assert not probes.sent(1)

@@ -112,6 +112,15 @@ async def test_reply_in_pieces_is_awaited_to_its_end() -> None:
     assert pauses == [pytest.approx((len(REPLY) - 2) * CHARACTER - 0.0003)]
 
 
+async def test_pieces_beside_the_reply_are_traced_with_their_remarks() -> None:
+    other = frame(2, honest_pdu(READ.pdu()))
+    wire = Wire((0.1, frame(1, READ.pdu()) + other + REPLY))
+    assert (await wire.exchange()).pdu == REPLY[1:-2]
+    assert [(entry.direction, entry.data, entry.note) for entry in wire.trace.frames()[1:]] == [
+        ("in", frame(1, READ.pdu()), "echo"), ("in", other, "of device 2"), ("in", REPLY, ""),
+    ]  # fmt: skip
+
+
 async def test_request_without_a_reply_ends_with_its_time() -> None:
     wire = Wire()
     result = await wire.exchange(time_out=-1.0)

@@ -58,5 +58,47 @@ EQUIVALENT: dict[str, str] = {
         "Without a loop, `_enter` raises the same error."
     ),
     "tui/session/carry_on.py:carried_on: return: return -> pass": ("It is the last statement."),
+    "tui/bus/schedule/outcomes.py:Outcomes._report_write: constant: 0.0 -> 1.0": (
+        "The time counts from the start of the computer: no write is in its first second."
+    ),
+    'tui/bus/rtu/master.py:RtuMaster._send: text: "The line was lost." -> ""': (
+        "The call before it has set the failure, which is raised."
+    ),
+    "tui/bus/schedule/probes.py:Probes.sent: constant: 0 -> 1": (
+        "All devices of a gateway share one entry, whatever its key is."
+    ),
+    "tui/drive/read_plan.py:plan_reads: argument: ReadPlan((), 0.0) -> ReadPlan(0.0, ())": (
+        "There is always a plan: that without any block."
+    ),
+    "tui/drive/read_plan.py:plan_reads: constant: 0.0 -> 1.0": (
+        "There is always a plan: that without any block."
+    ),
+    "tui/drive/read_plan.py:plan_reads: boundary: (seconds, len(requests)) < (best.seconds,"
+    " len(best.requests)) -> ((seconds, len(requests)) <= (best.seconds, len(best.requests)))": (
+        "Of two plans with equally many reads in the same time, neither is better."
+    ),
+    "tui/drive/read_plan.py:_cheapest: constant: 0.0 -> 1.0": (
+        "It is added to the time of each choice alike."
+    ),
+    "tui/drive/read_plan.py:_cheapest: constant: 1 -> 2 #3": (
+        "Reads that are too long are looked at in addition, and `run_length` refuses them."
+    ),
+    "tui/drive/read_plan.py:_cheapest: boundary: start < end - 1 -> (start <= end - 1)": (
+        "A run of one parameter is no words long, which is never the most."
+    ),
+    "tui/drive/read_plan.py:_cheapest: constant: 1 -> 10 #4": (
+        "Reads that are too long are looked at in addition, and `run_length` refuses them."
+    ),
+    "tui/drive/read_plan.py:_cheapest: constant: 1 -> 2 #4": (
+        "Reads that are too long are looked at in addition, and `run_length` refuses them."
+    ),
+    "tui/drive/words.py:to_words: constant: 0 -> 1": ("The value replaces all bits of its word."),
+    "tui/drive/values.py:engineering: boundary: -int(scale.as_tuple().exponent) > decimals ->"
+    " (-int(scale.as_tuple().exponent) >= decimals)": (
+        "A number with so many decimals stays as it is."
+    ),
+    "tui/drive/values.py:engineering: constant: 1 -> 10": "Only the exponent of it counts.",
+    "tui/drive/values.py:engineering: constant: 1 -> 2": "Only the exponent of it counts.",
+    'tui/drive/values.py:engineering: text: "0" -> "" #2': "To add 0 changes nothing.",
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -21,11 +22,14 @@ from tui.drive.chart import (
 )
 from tui.drive.orders import order_target, stop_alike, with_options
 from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import (
     ChannelBits,
     ChannelRow,
     Chart,
     DirectionBit,
+    FullScale,
+    Parameter,
     State,
     StatusBit,
     When,
@@ -113,6 +117,14 @@ def test_state_of_a_profile_without_a_chart_is_that_of_its_fault_word() -> None:
     profile = profile_of()
     assert read_chart(profile, {"status": 1, "fault": 5}).state is UNLISTED_FAULT
     assert read_chart(profile, {"status": 1, "fault": 0}).state is UNKNOWN
+    other = msgspec.structs.replace(FAULT, id="other", mask=7, value=7)
+    found = read_chart(profile_of(chart_of(FAULT, other)), {"status": 7, "fault": 5})
+    assert found.state is FAULT
+    found = read_chart(
+        profile_of(chart_of(msgspec.structs.replace(FAULT, mask=7), other)),
+        {"status": 7, "fault": 5},
+    )
+    assert found.state is other, "the status word itself shows a fault"
     chart = chart_of(READY)
     assert state_now(profile, chart, {"status": 1, "fault": 5}) is UNLISTED_FAULT
     assert state_now(profile, chart, {"fault": 0}) is UNKNOWN
@@ -135,6 +147,38 @@ def test_fault_word_shows_a_present_fault_or_the_last_one(
     watched = ["status", "dir", "local", "from", *([code] if code else [])]
     assert watched_codes(profile) == watched
     assert watched_codes(profile_of(faults=faults)) == []
+
+
+def test_state_needs_its_other_words_too() -> None:
+    """Without one of them the state is unknown."""
+    local = msgspec.structs.replace(READY, id="local", also=[When(parameter="local", values=[1])])
+    chart = chart_of(local, RUNNING, FAULT)
+    for raws, state in (({"local": 1}, local), ({"local": 0}, UNKNOWN), ({}, UNKNOWN)):
+        assert read_chart(profile_of(chart), {"status": 1, **raws}).own is state
+
+
+def test_chart_is_that_whose_condition_holds_else_the_first_without_one() -> None:
+    local, remote = (chart_of(when=When(parameter="local", values=[value])) for value in (1, 2))
+    plain, other = chart_of(), chart_of()
+
+    def chart(raw: int, *charts: Chart) -> Chart | None:
+        profile = cast(Any, SimpleNamespace(data=SimpleNamespace(charts=charts)))
+        return Profile.chart(profile, {"local": raw})
+
+    assert chart(2, plain, local, remote) is remote
+    assert chart(0, local, plain, other) is plain
+    assert chart(0, local, remote) is local
+    assert chart(0) is None
+
+
+def test_full_scale_gives_the_value_of_a_count() -> None:
+    full = FullScale(counts=16384, parameter="3-03")
+    parameter = cast(Any, SimpleNamespace(full_scale=full, scale_by=None, scale="1"))
+    profile = cast(Any, {"3-03": SimpleNamespace(scale="0.001")})
+    assert Profile.scale(profile, parameter, {"3-03": 50000}) == Decimal(50) / 16384
+    assert Profile.scale(profile, parameter, {"3-03": 0}) is None
+    assert Profile.scale(profile, parameter, {}) is None
+    assert cast(Any, Parameter.scale_source).fget(parameter) == "3-03"
 
 
 # -- source of commands ----------------------------------------------------------------------------
@@ -174,6 +218,16 @@ def test_first_row_that_applies_shows_the_source_of_commands(
     assert found.parameter.code == code
 
 
+def test_bits_name_the_source_of_commands_or_of_the_reference() -> None:
+    for raw, text in ((3, "fieldbus, keypad"), (2, "keypad"), (0, "none")):
+        profile = profile_of(chart_of(), command=[row("Cd1")], bits=BITS)
+        found = command_channel(profile, {"Cd1": raw})
+        assert found is not None
+        assert found.text == text
+        profile.data.channels.reference = [row("Fr1")]
+        assert read_chart(profile, {"status": 2, "Fr1": raw}).reference == text
+
+
 def test_source_without_a_row_is_unknown() -> None:
     rows = [row("Cd2", when=IF_SWITCHED)]
     assert command_channel(profile_of(command=rows), {"switch": 0}) is UNKNOWN_CHANNEL
@@ -199,6 +253,9 @@ def test_word_keeps_its_option_bits_and_zero_stays_zero() -> None:
     order = cast(Any, SimpleNamespace(parameter="", words=(7, 0, -1)))
     assert with_options(chart, order, {"command": 0x0F11}) == [0x0817, 0, 0xFFFF]
     assert with_options(chart, order, {}) == [7, 0, 0xFFFF]
+    option.mask = 0x0801
+    assert with_options(chart, cast(Any, SimpleNamespace(parameter="", words=(6,))), {}) == [6]
+    option.mask = 0x0810
     order.parameter = "another"
     assert with_options(chart, order, {"command": 0xFFFF, "another": 0xFFFF}) == [7, 0, 0xFFFF]
 

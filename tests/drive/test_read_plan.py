@@ -196,6 +196,50 @@ def test_scanner_that_saves_no_time_is_not_used() -> None:
     assert plan.checks == ()
 
 
+ALL_SLOTS = {"P2165": 1, "P2166": 2, "P2167": 3}
+
+
+@pytest.mark.parametrize(
+    ("fields", "expected"),
+    [
+        ({"fixed_start": False}, [(0x1876, 2)]), ({}, [(0x1875, 3)]),
+        ({"fixed_start": False, "min_words": 3}, [(0x1875, 3)]),
+        ({"min_words": 4}, [(900, 1), (1200, 1)]),
+        ({"direction": "write"}, [(900, 1), (1200, 1)]),
+    ],
+)  # fmt: skip
+def test_block_is_read_as_far_as_it_can_be(
+    fields: dict[str, object], expected: list[tuple[int, int]]
+) -> None:
+    choices = [{"raw": raw, "parameter": f"P{a}"} for raw, a in ((1, 500), (2, 900), (3, 1200))]
+    block = {**BLOCK, "choices": choices, **fields}
+    profile = profile_of([500, 900, 1200, 2165, 2166, 2167], single=True, blocks=[block])
+    assert spans(plan_reads(profile, codes([900, 1200]), TIMING, slots=ALL_SLOTS)) == expected
+
+
+def test_function_without_a_known_limit_reads_word_by_word() -> None:
+    profile = profile_of([1, 2, 3])
+    only = msgspec.structs.replace(profile.data.functions[0], max_read=None)
+    profile = Profile(msgspec.structs.replace(profile.data, functions=[only]))
+    assert spans(plan_reads(profile, codes([1, 2, 3]), TIMING)) == [(1, 1), (2, 1), (3, 1)]
+
+
+def test_words_are_read_by_their_own_function() -> None:
+    profile = profile_of([1, 2])
+    inputs = [msgspec.structs.replace(p, function=4) for p in profile.data.parameters]
+    profile = Profile(msgspec.structs.replace(profile.data, parameters=inputs))
+    plan = plan_reads(profile, codes([1]), TIMING)
+    assert [(request.address, request.function) for request in plan.requests] == [(1, 4)]
+
+
+def test_fields_of_one_word_are_read_at_once() -> None:
+    profile = profile_of([1, 2], single=True)
+    first, second = profile.data.parameters
+    fields = [first, msgspec.structs.replace(second, address=1)]
+    profile = Profile(msgspec.structs.replace(profile.data, parameters=fields))
+    assert spans(plan_reads(profile, codes([1, 2]), TIMING)) == [(1, 1)]
+
+
 @settings(deadline=None, max_examples=60)
 @given(
     slots=st.lists(st.sampled_from([0, 10, 11, 12, 20, 30, 40, 50]), min_size=3, max_size=3),
@@ -259,3 +303,17 @@ def test_no_other_split_is_cheaper(
         )
     )
     assert plan.seconds == pytest.approx(cheapest)
+
+
+def test_read_takes_its_characters_and_its_waits() -> None:
+    """8 of the request and 5 around the words, the turnaround, and the silence after the reply."""
+    timing = WireTiming(character=1.0, silence=4.0, turnaround=10.0)
+    assert [timing.read(words) for words in (1, 2, 10)] == [29.0, 31.0, 47.0]
+    assert WireTiming(character=1.0, silence=4.0, turnaround=2.0).read(1) == 23.0
+
+
+def test_plan_has_its_time_and_is_empty_without_codes() -> None:
+    plan = plan_reads(profile_of([1, 2, 3, 40]), ["P1", "P2", "P3", "P40"], TIMING)
+    assert spans(plan) == [(1, 3), (40, 1)]
+    assert plan.seconds == pytest.approx(TIMING.read(3) + TIMING.read(1))
+    assert plan_reads(profile_of([1]), [], TIMING) == ReadPlan((), 0.0)

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import ast
+from decimal import Decimal
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -89,3 +92,12 @@ def test_raw_of_text_follows_scale_and_unit_of_other_words() -> None:
             raw_of_text(profile, profile[code], "20", {})
     with pytest.raises(ValueRefused, match="is not a number in V"):
         raw_of_text(profile, profile["C"], "5 s", {"M": 1})
+
+
+def test_value_of_a_learned_scale_is_shown_as_learned() -> None:
+    taught = SimpleNamespace(number={7: Decimal("3.5")}.get, unit="A")
+    profile = cast(Any, SimpleNamespace(taught={"P": taught}))
+    word = cast(Any, SimpleNamespace(code="P"))
+    known, unknown = (shown(profile, word, raw, NOTHING) for raw in (7, 40000))
+    assert (known.raw, known.display, known.taught) == (7, "3.5 A", True)
+    assert (unknown.raw, unknown.display, unknown.taught) == (40000, "40000 raw", False)

@@ -14,12 +14,15 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import (
+    NOT_A_NUMBER,
     decimals_of,
     decode,
     encode,
     engineering,
     from_words,
+    hexadecimal,
     is_enumeration,
+    is_signed_type,
     percent_of,
     raw_range,
     set_bits,
@@ -408,3 +411,113 @@ def test_value_above_what_is_verified_has_a_question_mark(raw: int, unsure: bool
     value = decode(parameter(sure_up_to=100, unit="A", scale="0.1"), raw, {}, Decimal("0.1"))
     assert (value.text, value.unsure) == (f"{raw / 10:.1f}{'?' if unsure else ''}", unsure)
     assert value.unit == "A"
+
+
+@pytest.mark.parametrize(
+    ("raw", "scale", "offset", "text"),
+    [
+        (5, "0.1", "0", "0.5"), (0, "0.1", "0", "0.0"), (5, "0.1", "10", "10.5"),
+        (0, "0.1", "-40", "-40.0"), (0, "-0.1", "0", "0.0"), (5, "-0.1", "0", "-0.5"),
+        (5, "1", "0.25", "5.25"), (2, "0.33333", "0", "0.7"),
+    ],
+)  # fmt: skip
+def test_value_has_its_offset_its_decimals_and_no_negative_zero(
+    raw: int, scale: str, offset: str, text: str
+) -> None:
+    assert f"{engineering(raw, Decimal(scale), offset):f}" == text
+
+
+PLAIN = {"unit": "Hz", "scale": "0.1"}
+
+
+@pytest.mark.parametrize(
+    ("fields", "raw", "scale", "number", "unit", "text"),
+    [
+        ({"bits": [{"bit": 0, "name": "a"}]}, 0x237, "1", None, "", "16#0237"),
+        ({**PLAIN, "type": "float32"}, NOT_A_NUMBER, "0.1", None, "", "not a number"),
+        ({**PLAIN, "type": "float32"}, 15, "0.1", "1.5", "Hz", "1.5"),
+        ({**PLAIN, "type": "int32"}, NOT_A_NUMBER, "1", str(NOT_A_NUMBER), "Hz", "-2147483648"),
+        (PLAIN, 7, "0.1", None, "", "seven"),
+        ({"values": {"7": "seven"}}, 8, "1", None, "", "unknown (8)"),
+        (PLAIN, 15, None, "15", "raw", "15"),
+        (PLAIN, 15, "0.1", "1.5", "Hz", "1.5"),
+        ({**PLAIN, "offset": "-40"}, 15, "0.1", "-38.5", "Hz", "-38.5"),
+        ({**PLAIN, "sure_up_to": 15}, 15, "0.1", "1.5", "Hz", "1.5"),
+        ({**PLAIN, "sure_up_to": 14}, 15, "0.1", "1.5", "Hz", "1.5?"),
+    ],
+)  # fmt: skip
+def test_raw_value_is_shown_as_its_kind_requires(
+    fields: dict[str, object], raw: int, scale: str | None, number: str | None, unit: str, text: str
+) -> None:
+    by = Decimal(scale) if scale is not None else None
+    found = decode(parameter(**fields), raw, {7: "seven"}, by)
+    assert (found.raw, found.unit, found.text) == (raw, unit, text)
+    assert isinstance(found.raw, int)
+    assert found.number == (Decimal(number) if number is not None else None)
+    assert (found.unsure, found.taught) == (text.endswith("?"), False)
+    assert found.display == (f"{text} {unit}" if unit else text)
+
+
+@pytest.mark.parametrize(
+    ("fields", "is_named"),
+    [
+        ({"values": {"0": "off", "1": "on"}}, True), ({"enumeration": "list"}, True), ({}, False),
+        ({"values": {"0": "off"}, "unit": "s"}, False),
+        ({"values": {"0": "off"}, "scale": "0.1"}, False),
+        ({"values": {"0": "off"}, "full_scale": {"counts": 5, "parameter": "F"}}, False),
+        ({"values": {"0": "off"}, "min": 0, "max": 3}, True),
+        ({"values": {"0": "off"}, "min": 0, "max": 4}, False),
+        ({"values": {"0": "off"}, "max": 4}, True), ({"values": {"0": "off"}, "min": 0}, True),
+        ({"enumeration": "list", "min": 0, "max": 4}, True),
+    ],
+)  # fmt: skip
+def test_values_are_names_unless_they_are_those_of_a_number(
+    fields: dict[str, object], is_named: bool
+) -> None:
+    assert is_enumeration(parameter(**fields)) == is_named
+
+
+def test_raw_range_is_that_of_the_profile_else_of_the_type() -> None:
+    for fields, ends in (
+        ({}, (0, 65535)), ({"type": "int16"}, (-32768, 32767)), ({"min": 0, "max": 5}, (0, 5)),
+        ({"type": "int16", "min": -5}, (-5, 32767)), ({"type": "int16", "max": 0}, (-32768, 0)),
+        ({"type": "uint32"}, (0, (1 << 32) - 1)), ({"type": "int32"}, (-(1 << 31), (1 << 31) - 1)),
+        ({"mask": 7}, (0, 7)), ({"type": "float32"}, (NOT_A_NUMBER + 1, -NOT_A_NUMBER - 1)),
+    ):  # fmt: skip
+        assert raw_range(parameter(**fields)) == ends
+
+
+def test_words_are_those_of_the_value_and_a_field_keeps_its_other_bits() -> None:
+    field = parameter(shift=4, mask=7)
+    assert to_words(field, 5, held=0xFF8F) == (0xFFDF,)
+    assert from_words(field, [0xFFDF]) == 5
+    with pytest.raises(ValueRefused, match="other bits were not read"):
+        to_words(field, 5)
+    with pytest.raises(ValueRefused, match="P: 8 does not fit uint16"):
+        to_words(field, 8, held=0)
+    wide, low = (parameter(type="int32", low_word_first=first) for first in (False, True))
+    assert (to_words(wide, -2), to_words(low, -2)) == ((0xFFFF, 0xFFFE), (0xFFFE, 0xFFFF))
+    assert (from_words(wide, [0x0001, 0x0002]), from_words(low, [1, 2])) == (0x10002, 0x20001)
+    unsigned = parameter(type="uint32", low_word_first=False)
+    assert [from_words(each, [0x8000, 0]) for each in (wide, unsigned)] == [-(1 << 31), 1 << 31]
+    small = parameter(type="int16")
+    assert (from_words(small, [0x7FFF]), from_words(small, [0x8000])) == (0x7FFF, -0x8000)
+    assert (to_words(small, -1), to_words(parameter(), 0xFFFF)) == ((0xFFFF,), (0xFFFF,))
+    single = parameter(type="float32", scale="0.5", low_word_first=False)
+    assert to_words(single, 3) == (0x3FC0, 0)  # 1.5
+    assert from_words(single, [0x3FC0, 0]) == 3
+    assert from_words(single, [0x7F80, 0]) == NOT_A_NUMBER  # infinite
+    assert from_words(single, [0x4E80, 0]) == NOT_A_NUMBER  # 2**30: 2**31 counts
+    assert from_words(single, [0x4E7F, 0xFFFF]) == (1 << 31) - 128
+    with pytest.raises(ValueRefused, match="a float of 32 bits cannot hold it exactly"):
+        to_words(parameter(type="float32"), (1 << 24) + 1)
+    assert (hexadecimal(small, -1), hexadecimal(wide, 0x10237)) == ("16#FFFF", "16#00010237")
+    assert [is_signed_type(each) for each in (small, wide, single, parameter())] == [
+        True, True, True, False,
+    ]  # fmt: skip
+
+
+def test_set_bits_are_those_that_are_named_and_1() -> None:
+    bits = parameter(bits=[{"bit": bit, "name": str(bit)} for bit in (0, 1, 4, 15)]).bits
+    for word, names in ((0x8002, "1 15"), (0x0001, "0"), (0x0010, "4"), (0x7FEC, "")):
+        assert " ".join(bit.name for bit in set_bits(bits, word)) == names

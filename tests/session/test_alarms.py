@@ -10,7 +10,7 @@ from tui.drive.profile import library
 from tui.drive.profile.schema import FaultCode
 from tui.session.drive_state import DriveState, drive_state
 from tui.session.events import EventLog
-from tui.session.monitor.alarms import FaultOnsets, LineAlarms, PresentFault
+from tui.session.monitor.alarms import FaultOnset, FaultOnsets, LineAlarms, PresentFault
 
 RUNS = replace(drive_state(library.load("atv71"), {}), kind="running")
 OBF = FaultCode(raw=18, code="ObF", name="Overbraking")
@@ -145,3 +145,22 @@ def test_same_trip_of_a_returning_drive_is_recorded_once(bench: Bench) -> None:
     assert not bench.take({3: tripped(OBF)})
     assert [fault.wall for fault in bench.alarms.active] == [0.0]
     assert bench.kept == [(3, "ObF", "tripped")]
+
+
+def test_onset_of_a_fault_has_its_time_its_code_and_if_the_trip_was_seen() -> None:
+    onsets = FaultOnsets()
+    unknown = replace(RUNS, kind="unknown")
+    onsets.note(1, unknown, 1.0)
+    onsets.note(1, tripped(OBF), 2.0)
+    assert onsets.by_device == {1: FaultOnset(2.0, False, "ObF")}, "it was never seen without"
+    onsets.note(1, unknown, 3.0)
+    onsets.note(2, RUNS, 3.0)
+    onsets.note(2, tripped(None), 4.0)
+    assert onsets.by_device[1].wall == 2.0
+    onsets.note(2, tripped(OLF), 5.0)
+    onsets.note(2, tripped(None), 6.0)
+    assert onsets.by_device[2] == FaultOnset(4.0, True, "OLF")
+    onsets.note(2, tripped(OBF), 7.0)
+    assert onsets.by_device[2] == FaultOnset(7.0, True, "ObF")
+    onsets.note(2, RUNS, 8.0)
+    assert set(onsets.by_device) == {1}

@@ -401,6 +401,10 @@ def test_three_swapped_values_read_together_override_earlier_ones(
     assert not here.codes
     here.note(3.0, A=1, B=1, C=1)
     assert here.codes == ("A", "B", "C")
+    here = Votes(monkeypatch)
+    here.note(1.0, **{f"R{n}": 0 for n in range(8)})
+    here.note(2.0, A=1, B=1, C=1, D=1, R0=0)
+    assert here.codes == ("A", "B", "C", "D"), "four to one is a majority"
 
 
 def test_value_counts_for_ninety_seconds_and_its_latest_vote_only(

@@ -148,3 +148,14 @@ async def test_fake_sleep_ends_when_the_clock_advances() -> None:
     assert not sleeper.done()
     clock.advance(3600)
     await asyncio.wait_for(sleeper, 20)
+
+
+async def test_clock_of_a_session_is_that_of_the_computer() -> None:
+    clock = Clock()
+    before = time.monotonic(), time.time()
+    await clock.sleep(0.01)
+    now = clock.monotonic(), clock.wall()
+    assert [0.009 < late - early < 0.9 for late, early in zip(now, before, strict=True)] == [
+        True
+    ] * 2
+    assert clock.line_time(before[0]) == before[0]

@@ -13,7 +13,10 @@ import sys
 import threading
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
+from unittest.mock import MagicMock, Mock, call
 
 import pytest
 
@@ -331,3 +334,70 @@ def no_thread(thread: threading.Thread) -> None:
 def test_time_of_an_entry_has_milliseconds_and_its_zone(wall: float, millis: str) -> None:
     assert entry_time(wall) == f"1970-01-01T00:00:{millis}+00:00"
     assert len(entry_time(None)) == len(now_text()) == len(entry_time(wall))
+
+
+# -- without its thread ----------------------------------------------------------------------------
+
+
+@pytest.fixture
+def held(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, Mock, Mock]:
+    """A journal whose thread never begins, the thread, and what is to run at the end."""
+    thread, at_end = Mock(), Mock()
+    monkeypatch.setattr("tui.session.journal.threading.Thread", thread)
+    monkeypatch.setattr("tui.session.journal.atexit.register", at_end)
+    return Journal(tmp_path), thread, at_end
+
+
+def test_entry_waits_for_the_disk_and_is_known_by_what_was_sent(
+    held: tuple[Any, Mock, Mock],
+) -> None:
+    journal, thread, at_end = held
+    saved = replace(entry(1), eeprom="write")
+    journal.add(saved)
+    journal.add(replace(saved, answer="refused"), sent=False)
+    journal.add(replace(entry(2), kind="reset"))
+    journal.add(replace(entry(3), kind="fault"))
+    assert [each.kind for each in journal._waiting] == ["write", "write", "reset", "fault"]
+    assert [each.eeprom for each in journal.recent] == ["write", ""], "what was not sent wears none"
+    assert journal.sent == (saved, replace(entry(2), kind="reset"))
+    assert thread.mock_calls == [
+        call(target=journal._work, name="journal", daemon=True), call().start(),
+    ]  # fmt: skip
+    assert at_end.call_count == 1
+    ((ending,),) = [each.args for each in at_end.call_args_list]
+    journal.flush = Mock()
+    ending()
+    journal.flush.assert_called_once_with()
+
+
+def test_entry_after_the_end_of_a_journal_opens_it_again(held: tuple[Any, Mock, Mock]) -> None:
+    journal = held[0]
+    journal._closed, journal._changed = True, MagicMock()
+    journal.add(entry(1))
+    assert not journal._closed
+    journal._changed.notify_all.assert_called_once_with()
+
+
+def test_oldest_entries_are_dropped_and_counted(
+    held: tuple[Any, Mock, Mock], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    journal = held[0]
+    monkeypatch.setattr(module, "JOURNAL_BACKLOG", 2)
+    for number in range(2):
+        journal.add(entry(number))
+    assert journal.lost == 0
+    for number in range(2, 5):
+        journal.add(entry(number))
+    assert (list(journal._waiting), journal.lost) == ([entry(3), entry(4)], 3)
+
+
+def test_thread_that_cannot_begin_is_tried_again(held: tuple[Any, Mock, Mock]) -> None:
+    journal, thread, _ = held
+    thread.return_value.start.side_effect = RuntimeError("no thread")
+    for number in range(2):
+        journal.add(entry(number))
+    assert (journal._why, journal._failures, journal._thread) == ("no thread", 2, None)
+    thread.return_value.start.side_effect = None
+    journal.add(entry(2))
+    journal.add(entry(3))
+    assert (journal._thread, thread.call_count) == (thread.return_value, 3)

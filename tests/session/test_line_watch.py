@@ -19,7 +19,7 @@ from tui.bus.keep_alive import KeepAlive
 from tui.drive.chart import ENABLED_KINDS
 from tui.session.drive import DriveSession
 from tui.session.monitor import line_watch as line_watches
-from tui.session.monitor.line_watch import LineWatch
+from tui.session.monitor.line_watch import GLANCE, LineWatch
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.unknown_drive_poller import UnknownDrivePoller
 from tui.session.read.presence import UNKNOWN_TIMEOUT
@@ -578,3 +578,27 @@ async def test_check_of_a_drive_has_its_state_or_its_error(
     noted.clear()
     await here.watch._glance(kept)
     assert noted == [], "another session of the drive is kept now"
+
+
+@pytest.mark.internal_errors
+async def test_internal_error_with_one_drive_does_not_end_its_checks(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    slept: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        slept.append(seconds)
+        if len(slept) == 2:
+            raise asyncio.CancelledError
+
+    async def fails(_: object) -> float:
+        raise ValueError("on purpose")
+
+    session = SimpleNamespace(
+        device=7, full_reads_requested=0, clock=SimpleNamespace(sleep=sleep)
+    )  # fmt: skip
+    watch = cast(Any, object.__new__(LineWatch))
+    with pytest.raises(asyncio.CancelledError):
+        await watch._again(SimpleNamespace(session=session), fails)
+    assert slept == [GLANCE] * 2
+    assert caplog.messages == ["looking after device 7 failed"] * 2

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
+from unittest.mock import AsyncMock
 
 import pytest
 
@@ -11,7 +13,14 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.drive.profile import library
 from tui.session.clock import REAL_CLOCK, Clock
 from tui.session.drive import DriveSession
-from tui.session.monitor.timeout import has_begun, polling_stop_text, read_timeout, timeout_now
+from tui.session.monitor.timeout import (
+    _related_words,
+    has_begun,
+    polling_stop_text,
+    read_timeout,
+    timeout_now,
+    timeout_seconds,
+)
 from tui.session.read.presence import presence_read
 from tui.session.read.reader import ASK_AGAIN, Reader
 from tui.session.timeout_report import Timeout
@@ -201,3 +210,69 @@ async def test_few_words_are_read(family: str) -> None:
     line = OneDrive({parameter.address: 1 for parameter in profile.parameters})
     await reported(DriveSession(line, 1, profile))
     assert sum(count for _, count in line.requested) <= 3
+
+
+async def test_timeout_of_a_family_without_one_is_known() -> None:
+    line = Ports({TTO: 30})
+    assert await reported(session_of(line, timeout="")) == Timeout(known=True)
+    plain = DriveSession(line, 1, profile_of(parameter("STATE", STATE)))
+    assert await reported(plain) == Timeout(known=True)
+    assert line.read_so_far == []
+
+
+async def test_timeout_is_as_sure_as_its_document_and_read_as_urgently_as_requested(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    priorities: list[Priority] = []
+
+    async def before_read(self: Ports, device: int, registers: range, priority: Priority) -> None:
+        priorities.append(priority)
+
+    monkeypatch.setattr(Ports, "before_read", before_read)
+    for confidence, sure in (("manual", True), ("analogy", True), ("unverified", False)):
+        session = session_of(Ports({TTO: 30}), starts_confidence=confidence, needs_write=True)
+        found = await read_timeout(Reader(session), Priority.BACKGROUND, ["STATE"])
+        assert found.known
+        assert found.watch is not None
+        assert (found.watch.sure, found.watch.active) == (sure, False)
+    assert set(priorities) == {Priority.BACKGROUND}
+
+
+async def test_drive_that_is_known_to_be_away_is_not_looked_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    away = NoAnswer(1, 3, TTO, retry_in=2.0)
+    looked = AsyncMock()
+    monkeypatch.setattr("tui.session.monitor.timeout.look_for_drive", looked)
+    read = AsyncMock(side_effect=away)
+    reader = cast(Any, SimpleNamespace(session=session_of(Ports({})), read=read))
+    with pytest.raises(NoAnswer) as caught:
+        await read_timeout(reader, Priority.POLL)
+    assert caught.value is away
+    assert not looked.called
+
+
+@pytest.mark.parametrize(
+    ("needs_write", "reported_by_line", "codes"),
+    [(True, False, ["SLL", "CMD"]), (True, True, ["SLL"]), (False, False, ["SLL"])],
+)
+def test_command_word_shows_a_timeout_that_begins_with_a_command(
+    needs_write: bool, reported_by_line: bool, codes: list[str]
+) -> None:
+    session = session_of(Ports({}), needs_write=needs_write)
+    session.reported_by_line = reported_by_line
+    rules = session.profile.data.communication_fault
+    assert rules is not None
+    assert _related_words(session, rules) == codes
+
+
+@pytest.mark.parametrize(
+    ("raw", "number", "unit", "seconds"),
+    [(15, 1.5, "s", 1.5), (1500, 1500.0, "ms", 1.5), (7, 7.0, "s", None), (0, 0.0, "s", None),
+     (None, None, "s", None)],
+)  # fmt: skip
+def test_timeout_is_counted_in_seconds(
+    raw: int | None, number: float | None, unit: str, seconds: float | None
+) -> None:
+    reading = cast(Any, SimpleNamespace(raw=raw, number=number, unit=unit))
+    assert timeout_seconds(reading, 7) == seconds

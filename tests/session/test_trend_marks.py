@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
+from unittest.mock import Mock
 
 import msgspec
 import pytest
@@ -18,9 +19,12 @@ from tui.session.monitor import trend as trends
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.trend import (
     COMMAND_REACH,
+    MOST_NOTED,
+    NOTED_EVERY,
     TREND_MARKS,
     Trend,
     TrendMarker,
+    TrendNotes,
     TrendPoint,
     readout_parameter,
 )
@@ -29,6 +33,7 @@ ATV71 = library.load("atv71")
 READY, RUNNING, FAULT = (
     fakes.snapshot_of(ATV71, raws) for raws in (fakes.READY, fakes.RUNNING, fakes.FAULT)
 )
+UNKNOWN = fakes.snapshot_of(ATV71, {})
 LOST = replace(READY, error="Device 2 did not answer.")
 
 
@@ -50,6 +55,8 @@ def marks(*snapshots: Snapshot) -> list[str]:
         ([RUNNING, LOST, FAULT, FAULT], ["", "lost", "trip", ""]),
         ([FAULT, LOST, FAULT], ["", "lost", ""]),
         ([LOST, FAULT], ["", ""]),
+        ([READY, UNKNOWN, RUNNING], ["", "", ""]),
+        ([RUNNING, UNKNOWN, READY], ["", "", ""]),
     ],
 )
 def test_each_event_is_marked_once(snapshots: list[Snapshot], expected: list[str]) -> None:
@@ -61,6 +68,7 @@ def test_each_event_is_marked_once(snapshots: list[Snapshot], expected: list[str
     [
         ([30.0, 30.0, 40.0, 40.0], ["", "", "reference", ""]),
         ([30.0, 30.0, 30.4, 30.4], ["", "", "", ""]),
+        ([30.0, 30.0, 30.5], ["", "", "reference"]),
         ([30.0, 30.5, 31.2, 32.0, 31.1], [""] * 5),
         ([30.0, None, 40.0], ["", "", ""]),
         ([30.0, 30.0, -30.0], ["", "", "reference"]),
@@ -181,3 +189,38 @@ def test_trend_keeps_the_points_of_ten_minutes(monkeypatch: pytest.MonkeyPatch) 
     trend.join([TrendPoint(0.25, ()), TrendPoint(0.5, ()), TrendPoint(600.0, ())])
     assert [point.time for point in trend.points] == [0.5, 100.0, 600.0, 600.5]
     assert trend.points[2].values == (1.0, None, None), "its own point counts"
+
+
+@pytest.mark.parametrize(("before", "by"), [(COMMAND_REACH, ("run",)), (COMMAND_REACH + 0.5, ())])
+def test_command_of_two_seconds_before_may_be_the_cause_of_a_start(
+    before: float, by: tuple[str, ...]
+) -> None:
+    marker = TrendMarker()
+    marker.commands.append(trends.TrendWrite(100.0, "run"))
+    marker.mark(replace(READY, time=99.0), 50.0)
+    found = marker.mark(replace(RUNNING, time=100.0 + before), 50.0)
+    assert (found.mark, found.by) == ("start", by)
+
+
+def test_trend_is_noted_every_two_seconds_or_hundred_points() -> None:
+    facts, trend = Mock(), Mock(kind="trend atv71")
+    notes = TrendNotes(facts, 2, trend)
+    for _ in range(2):
+        notes.ask()
+        notes.end()
+    facts.notes.ask.assert_called_once_with(2, "trend atv71")
+    assert facts.events.subscribe.call_count == 2
+
+    def noted(*times: float) -> list[int]:
+        facts.notes.leave.reset_mock()
+        for time in times:
+            notes.add(TrendPoint(time, (1.0, None, 2.0)))
+        left = [each.args[0] for each in facts.notes.leave.call_args_list]
+        assert {(note.device, note.kind) for note in left} <= {(2, "trend atv71")}
+        return [len(msgspec.msgpack.decode(note.data)) for note in left]
+
+    assert noted(0.0, 1.0, NOTED_EVERY) == [3]
+    assert noted(10.0, 9.0 + NOTED_EVERY) == []
+    assert noted(10.0 + NOTED_EVERY) == [3]
+    assert noted(*[20.0] * (MOST_NOTED - 1)) == []
+    assert noted(20.0) == [MOST_NOTED]

@@ -6,13 +6,17 @@ import asyncio
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
+import msgspec
 import pytest
 
 from tests.session.sets_bench import bench
 from tests.session.test_journal import entry
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
+from tui.drive.profile.schema import When
 from tui.drive.settings.memory_orders import eeprom_use
 from tui.session.drive import DriveSession
 from tui.session.eeprom_counts import (
@@ -62,6 +66,26 @@ def counts_of(counts: EepromCounts, drive: str = "A", device: int = 2) -> DriveC
 def test_eeprom_use_by_family(profile: str, code: str, raw: int, use: str) -> None:
     family = library.load(profile)
     assert eeprom_use(family, family[code], raw) == use
+
+
+def test_negative_word_saves_as_its_bits_do() -> None:
+    saves = [When(parameter="P", values=[0xFFFF])]
+    memory = SimpleNamespace(save=None, eeprom=SimpleNamespace(also_saved_by=saves))
+    family = cast(Any, SimpleNamespace(data=SimpleNamespace(memory=memory)))
+    word = cast(Any, SimpleNamespace(code="P", storage="none"))
+    assert [eeprom_use(family, word, raw) for raw in (-1, 0xFFFF, 0x7FFF)] == ["save", "save", ""]
+    memory.save = SimpleNamespace(parameter="P", raw=-1, bit=False)
+    memory.eeprom.also_saved_by = []
+    assert [eeprom_use(family, word, raw) for raw in (-1, 0xFFFF, 0x7FFF)] == ["save", "save", ""]
+
+
+@pytest.mark.parametrize(
+    ("storage", "use"), [("unknown", "write"), ("eeprom", "write"), ("ram", "")]
+)
+def test_setting_that_may_be_stored_counts_as_stored(storage: str, use: str) -> None:
+    family = library.load("atv71")
+    setting = msgspec.structs.replace(family["ACC"], storage=storage)
+    assert eeprom_use(family, setting, 30) == use
 
 
 def test_counts_are_added_by_identity_and_parameter(tmp_path: Path) -> None:
