@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, cast
@@ -11,7 +10,7 @@ from typing import Any, cast
 import pytest
 
 from tui.bus.errors import LineError, NoAnswer
-from tui.session.command.stop_report import Phase, StopReport
+from tui.session.command.stop_report import Phase, StopReport, StopSummary
 from tui.session.running import motor_run, watching
 from tui.session.running.ending import Ending
 from tui.session.running.errors import MotorStopped, MotorTripped, NotStopped
@@ -130,10 +129,14 @@ class Rig:
         assert [session.device for session in sessions] == [1]
         self.stops.append(("stop", by))
 
-    async def _ended(self, sessions: list[Any], seconds: float) -> None:
-        assert ([session.device for session in sessions], seconds) == ([1], math.inf)
+    async def _ended(self, sessions: list[Any], seconds: float) -> StopSummary:
+        assert [session.device for session in sessions] == [1]
+        assert 0 < seconds < 1.0  # it looks for a drive that does not stop
         self.reports[1] = self.results.pop(0) if len(self.results) > 1 else self.results[0]
-        self.after_stop()
+        summary = StopSummary([self.reports[1]])
+        if summary.ended:
+            self.after_stop()
+        return summary
 
 
 async def test_run_is_stopped_after_its_time(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -368,6 +371,18 @@ async def test_lost_line_is_reported_once_and_the_stop_sent_when_it_returns(
         ]
         * 2
     )
+
+
+async def test_silent_drive_is_reported_before_the_last_try_of_its_stop(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    rig = Rig(monkeypatch)
+    rig.run.seconds, rig.error = 0.1, "no answer"
+    unheeded = NOT_STOPPED._replace(phase=Phase.UNHEEDED)
+    rig.results = [unheeded, unheeded, STOPPED]
+    await rig.run.carry_out()
+    assert [text.partition("\n")[0] for text in rig.warned] == ["NOT STOPPED yet: no answer"]
+    assert rig.events[-1] == ("stopped", "Device 1: stopped.")
 
 
 @pytest.mark.parametrize(("ahead", "bad"), [(-0.01, False), (0.0, False), (0.01, True)])

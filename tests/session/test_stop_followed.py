@@ -11,6 +11,7 @@ import pytest
 
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import (
+    OUTCOME_UNKNOWN,
     DeviceException,
     LineError,
     LineFailed,
@@ -373,6 +374,49 @@ async def test_wave_does_not_wait_for_a_drive_that_answers_nothing(
     assert stopper.reports[2].phase is Phase.FAILED
 
 
+class Silent(Ramp):
+    """A drive that answers nothing, each exchange a second long, until a number of writes."""
+
+    def __init__(self, clock: OwnTime, writes: int) -> None:
+        super().__init__(clock, 0.0)
+        self.left = writes
+
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        if self.left:
+            await self.clock.sleep(1.0)
+            raise NoAnswer(device, 3, registers[0])
+        await super().before_read(device, registers, priority)
+
+    async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
+        if self.left:
+            await self.clock.sleep(1.0)
+            self.left -= 1
+            raise NoAnswer(device, 6, address, f"Device {device} did not answer.{OUTCOME_UNKNOWN}")
+        return await super().write(device, address, values, **how)
+
+
+@pytest.mark.parametrize(("writes", "last"), [(2, Phase.STOPPED), (STOP_TRIES, Phase.FAILED)])
+async def test_silent_drive_is_not_stopped_long_before_the_last_try(
+    writes: int, last: Phase, journal: Journal
+) -> None:
+    drive, events = Silent(OwnTime(), writes), EventLog()
+    stopper = Stopper(drive, journal, events)
+    stopper.stop([DriveSession(drive, 1, PROFILE, clock=drive.clock)])
+    reports: list[StopReport] = []
+    async with asyncio.timeout(20.0):
+        while stopper.reports[1].phase not in OVER:
+            if stopper.reports[1] not in reports:
+                reports.append(stopper.reports[1])
+            await asyncio.sleep(0)
+    silent = next(report for report in reports if report.phase is Phase.UNHEEDED)
+    assert silent.since - silent.time <= 3.0
+    assert "does not answer. The stop is repeated. Stop it at the machine." in silent.text
+    assert stopper.reports[1].phase is last
+    assert "may or may not" not in stopper.reports[1].text
+    texts = [event.text for event in events.events if "The stop is repeated" in event.text]
+    assert len(texts) == 1  # once, whatever the tries
+
+
 async def test_stop_of_a_lost_line_is_left_to_the_prepared_frames(journal: Journal) -> None:
     drive = Ramp(OwnTime(), 0.0)
     stopper = Stopper(drive, journal)
@@ -682,6 +726,9 @@ class Tried:
         if isinstance(end, Exception):
             raise end
         return end
+
+    def tell_silent(self) -> None:
+        """Report nothing."""
 
 
 REFUSED, SILENT = DeviceException(1, 6, COMMAND, 4), NoAnswer(1, 6, COMMAND)

@@ -39,6 +39,7 @@ from .stop_report import Phase, not_proved, not_stopped
 
 log = logging.getLogger(__name__)
 
+DOES_NOT_ANSWER = "device {device} does not answer. The stop is repeated."
 STILL_TURNS = "it still turns after a minute."
 STANDSTILL_UNKNOWN = "it may still turn after a minute: its output frequency was not read."
 STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
@@ -244,6 +245,14 @@ class MotorStop:
         self.sent = True
         if not self._unheeded:
             self.say(self.session, Phase.STOPPING, order.name, self.ordered)
+
+    def tell_silent(self) -> None:
+        """Report a drive that has answered nothing for a while: its stop is still repeated."""
+        session, clock = self.session, self.session.clock
+        heard = session.line.device_state(session.device).heard
+        since = self.ordered if heard is None else max(self.ordered, clock.line_time(heard))
+        if clock.monotonic() - since > TAKES_EFFECT:
+            self._tell_unheeded(DOES_NOT_ANSWER.format(device=session.device))
 
     def _tell_unheeded(self, why: str) -> None:
         self._unheeded = True

@@ -24,6 +24,7 @@ from tui.bus.errors import (
     LineError,
     LineLost,
     RequestRefused,
+    strip_outcome_note,
 )
 from tui.drive.errors import DriveError
 from tui.drive.orders import (
@@ -281,7 +282,8 @@ class Stopper:
             except (OrderRefused, DeviceException) as refused:
                 error = str(refused)
             except ExchangeError as failure:
-                error = str(failure)
+                error = strip_outcome_note(failure)
+                carried_on(stop.tell_silent)
                 continue
             except (LineError, DriveError) as failure:
                 error = str(failure)

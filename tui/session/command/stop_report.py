@@ -34,7 +34,7 @@ class Phase(StrEnum):
     STOPPING = "stopping"
     """Its frame was sent."""
     UNHEEDED = "unheeded"
-    """Its frame was sent, or waits, but another source runs the motor."""
+    """Its frame was sent, or waits, but another source runs the motor, or the drive is silent."""
     STOPPED = "stopped"
     FAILED = "failed"
 

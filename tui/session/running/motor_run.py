@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import math
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
@@ -72,6 +71,8 @@ class MotorRun:
     """True if the run command is on its way, so that it may be sent at any time."""
     _earlier: tuple[Entry, ...] = field(init=False)
     _stops: int = field(init=False)
+    _warned: bool = field(default=False, init=False)
+    """True if it was reported that the motor does not stop."""
 
     def __post_init__(self) -> None:
         self._earlier = self.fleet.journal.sent
@@ -212,7 +213,9 @@ class MotorRun:
         while True:
             ordered = time.monotonic()
             stopper.stop([session], by=self.by)
-            await stopper.ended([session], math.inf)
+            while not (await stopper.ended([session], RUN_POLL_INTERVAL)).ended:
+                if stopper.reports[session.device].phase is Phase.UNHEEDED:
+                    self._warn()
             report = stopper.reports[session.device]
             if report.phase is Phase.STOPPED:
                 self.observer.report("stopped", f"Device {session.device}: stopped.")
@@ -227,6 +230,16 @@ class MotorRun:
             if failed == STOPS_THAT_MAY_FAIL:
                 raise NotStopped(f"Device {session.device}: {report.text}")
 
+    def _warn(self) -> None:
+        """Report once that a silent drive was not stopped yet, and what happens now."""
+        error = latest_of(self.console).error
+        if error and not self._warned:
+            self._warned = True
+            self.observer.warn(
+                f"NOT STOPPED yet: {error}\n{self._timeout_text()} The motor is stopped as soon as"
+                " the drive answers. Until then, stop it at the machine."
+            )
+
     def _stands(self) -> bool:
         """Return True if the motor is at standstill, even if the drive did not accept the stop."""
         latest = latest_of(self.console)
@@ -235,17 +248,13 @@ class MotorRun:
 
     async def _line_was_bad(self, since: float) -> bool:
         """Wait until the drive answers; return True if it failed to answer since a time."""
-        requested, bad, reported = time.monotonic(), False, False
+        requested, bad = time.monotonic(), False
         while True:
             latest = latest_of(self.console)
             if latest.error and latest.time > since:
                 bad = True
-                if not reported:
-                    reported = True
-                    self.observer.warn(
-                        f"NOT STOPPED yet: {latest.error}\n{self._timeout_text()} The motor is"
-                        " stopped as soon as the drive answers. Until then, stop it at the machine."
-                    )
+                self._warn()
             elif not latest.error and latest.time > requested:
+                self._warned = False
                 return bad
             await asyncio.sleep(RUN_POLL_INTERVAL)
