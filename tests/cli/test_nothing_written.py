@@ -94,7 +94,6 @@ REFUSED = {
     "run above a limit": Refused(
         "atv71", (*RUN, "--reference", "90Hz"), "above HSP", sets={"HSP": 500}
     ),
-    "run, no number": Refused("atv71", (*RUN, "--reference", "fast"), "is not a reference"),
     "run, scale not known": Refused(
         MIXER, (*RUN, "--reference", "20Hz"), "its scale depends on MODE", sets={"MODE": 9}
     ),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import signal
 import sqlite3
 from contextlib import closing
@@ -100,6 +101,7 @@ def test_ctrl_c_ends_the_recording_with_a_whole_file(tmp_path: Path) -> None:
         (("RFR", "--out", "new.sqlite", "--trigger", "faults"), "'faults' is not a trigger"),
         (("RFR", "--out", "new.sqlite", "--count", "1"), "--count requires --trigger"),
         (("RFR", "--out", "-"), "it needs a FILE"),
+        (("RFR", "--out", "pipe", "--force"), "pipe is not a regular file"),
         (("XYZQ", "--out", "new.sqlite"), "no parameter 'XYZQ'"),
         (("RFR", "--out", "none/new.sqlite/x"), "none"),
     ],
@@ -108,6 +110,7 @@ def test_refused_recording_writes_no_file(
     arguments: tuple[str, ...], text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
+    os.mkfifo("pipe")
     (tmp_path / "there.sqlite").write_text("mine")
     (tmp_path / "none").write_text("")
     done = ended(2, "record", "sim:atv71", *arguments)

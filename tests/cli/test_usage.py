@@ -94,3 +94,22 @@ def test_ctrl_c_is_not_reported_as_a_difference(monkeypatch: pytest.MonkeyPatch)
     done = ended(130, "ports", "--json")
     assert json.loads(done.stdout)["status"] == 130
     assert "Ended by Ctrl-C" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("write", "sim:v20", "P1120=fast", "--arm"),
+        ("write", "sim:v20", "XYZQ=1", "--arm"),
+        pytest.param(("reference", "sim:atv71", "fast", "--arm"), marks=pytest.mark.sweep),
+        pytest.param(("block", "sim:atv71", "set", "1=LCR", "--arm"), marks=pytest.mark.sweep),
+    ],
+    ids=lambda words: f"{words[0]} {words[2]}",
+)
+def test_bad_value_and_bad_code_have_the_same_status(words: tuple[str, ...]) -> None:
+    ended(2, *words)
+
+
+@pytest.mark.sweep
+def test_why_uses_the_profile_of_a_simulated_line() -> None:
+    assert "Name the drive's profile" not in ended(0, "why", "sim:v20").stdout

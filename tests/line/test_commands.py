@@ -315,7 +315,6 @@ REFUSED = {
     "interlock": ("atv31", {"LAC": 1}, ("run",), r"below L3"),
     "channel": ("atv71", {"CD1": 0, "CHCF": 2}, ("run",), "not commanded by Modbus"),
     "limit": ("atv71", {"HSP": 500}, ("reference", "90Hz"), "above HSP"),
-    "no reference": ("atv71", {}, ("reference", "fast"), "is not a reference"),
     "run at a limit": ("atv71", {"HSP": 500}, ("run", "--reference", "90Hz"), "above HSP"),
     "no fault": ("atv71", {}, ("reset",), "No fault to reset"),
 }

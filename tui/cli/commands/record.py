@@ -213,6 +213,8 @@ def record(
     """
     if path == STANDARD:
         raise click.UsageError(NOT_TO_OUTPUT)
+    if path.exists() and not path.is_file():
+        raise Failure(f"{path} is not a regular file. Choose another name.", USAGE)
     if path.exists() and not force:
         raise Failure(f"{path} already exists. Choose another name or use --force.", USAGE)
     if count is not None and not triggers:

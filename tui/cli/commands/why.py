@@ -72,12 +72,15 @@ async def _requested(
     opened: OpenLine, target: Target, named: Profile | None
 ) -> tuple[Diagnosis, DriveFields | None]:
     """The diagnosis of a drive on an open line, and how a document about it begins."""
+    from tui.drive.profile import library
     from tui.session.diagnosis.asking import profile_remembered
     from tui.session.diagnosis.diagnosis import diagnosed
     from tui.session.diagnosis.examining import examine_line
 
     line, device = opened.line, target.device
     profile = named or await asyncio.to_thread(profile_remembered, line.link, device)
+    if profile is None and device in opened.profiles:
+        profile = await asyncio.to_thread(library.load, opened.profiles[device])
     changed = opened.known.text if opened.known is not None else ""
     found = diagnosed(await examine_line(line, device, profile, changed=changed))
     fields = None

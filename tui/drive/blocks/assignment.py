@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ..errors import DriveError
+from ..errors import DriveError, UnknownParameter
 from ..profile.profile import Profile
 from ..profile.schema import Block, Parameter
 
@@ -18,6 +18,10 @@ UNUSED = 0
 
 class MappingError(DriveError):
     """A slot cannot hold the requested value; the text says why and what to do."""
+
+
+class UnknownSlot(MappingError, UnknownParameter):
+    """A profile has no slot with the typed code."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,14 +100,14 @@ def slot_target(profile: Profile, block: Block, raw: int) -> Parameter | None:
 
 
 def place_of(profile: Profile, slot: str) -> tuple[Block, int]:
-    """Return block and place of a slot by its code, ignoring case; raises MappingError."""
+    """Return block and place of a slot by its code, ignoring case; raises UnknownSlot."""
     for block in profile.data.blocks:
         for place, code in enumerate(block.slots):
             if code.casefold() == slot.strip().casefold():
                 return block, place
     known = [f"{b.slots[0]} to {b.slots[-1]}" for b in profile.data.blocks]
     hint = f"It has {', '.join(known)}." if known else no_blocks(profile)
-    raise MappingError(f"{profile.name} has no slot {slot!r}. {hint}")
+    raise UnknownSlot(f"{profile.name} has no slot {slot!r}. {hint}")
 
 
 def no_blocks(profile: Profile) -> str:

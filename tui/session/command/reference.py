@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 
-from tui.drive.errors import UnitRefused, ValueRefused
+from tui.drive.errors import NotAValue, UnitRefused, ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity, ScaleWhen
 from tui.drive.sentences import any_of
@@ -171,13 +171,13 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Shown]
     """
     match = _TYPED.fullmatch(text.strip())
     if match is None:
-        raise ValueRefused(f"{text!r} is not a reference. Write it like 30, 30.5Hz or 900rpm.")
+        raise NotAValue(f"{text!r} is not a reference. Write it like 30, 30.5Hz or 900rpm.")
     typed, unit = Decimal(match[1].replace(",", ".")), spelled((match[2] or "").strip())
     known = ReferenceUnits(profile, readings)
     if not reference_parameters(profile):
         raise ValueRefused(no_place(profile, unit or "Hz"))
     if typed < 0:
-        raise ValueRefused("A reference cannot be negative. Run reverse instead.")
+        raise NotAValue("A reference cannot be negative. Run reverse instead.")
     parameter, number = _placed(known, text, typed, unit)
     raws, absent = known.raws, known.absent
     if refusal := other_scale(profile, raws):
