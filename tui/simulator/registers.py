@@ -46,6 +46,13 @@ class Registers:
             if word_count(p) == 1 and not is_field(p)
         }
         """Address and range of each parameter that is one whole word: nearly every one."""
+        self._fields: dict[int, int] = {}
+        """Bits of a whole word that are parameters of their own, by address."""
+        for parameter in profile.parameters:
+            if is_field(parameter):
+                address = _addresses(parameter)[0]
+                bits = parameter.mask << parameter.shift & 0xFFFF
+                self._fields[address] = self._fields.get(address, 0) | bits
         for parameter in profile.parameters:
             for address in _addresses(parameter):
                 self._owner.setdefault(address, parameter)
@@ -165,7 +172,10 @@ class Registers:
         if (whole := self._whole.get(parameter.code)) is not None:
             # the drive shows about twenty values at each time step
             address, low, high = whole
-            self._words[address] = self._in_force[address] = min(max(raw, low), high) & 0xFFFF
+            word = min(max(raw, low), high) & 0xFFFF
+            if (fields := self._fields.get(address)) is not None:
+                word = word & ~fields | self._words.get(address, 0) & fields
+            self._words[address] = self._in_force[address] = word
             return
         low, high = type_range(parameter)
         for words in (self._words, self._in_force):

@@ -74,7 +74,9 @@ def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
             f" {pair.address} and {pair.address + 1}."
         )
     bits, others = (p.mask << p.shift for p in (parameter, other))
-    if not bits & others:
+    # a status word whose upper byte is the fault: each is read, neither is written
+    inside = (bits == 0xFFFF) is not (others == 0xFFFF)
+    if not bits & others or (inside and parameter.access == other.access == "r"):
         return ""
     if bits == others == 0xFFFF:
         return f"address {address} already belongs to {other.code}; fields need mask and shift."
