@@ -281,22 +281,14 @@ def request_of(run: Sequence[Parameter]) -> ReadRequest:
 
 
 def run_length(
-    profile: Profile,
-    run: Sequence[Parameter],
-    unreadable: Collection[str] = (),
-    longest: int | None = None,
+    profile: Profile, run: Sequence[Parameter], unreadable: Collection[str] = ()
 ) -> int | None:
-    """Return the number of words of a read over this run; None if the drive does not allow it.
-
-    `longest` is the limit of a function other than 3.
-    """
+    """Return the number of words of a read over this run; None if the drive does not allow it."""
     count = _span(run)
+    if len(run) == 1 or count == 1:
+        return count
     reading = profile.data.reading
-    if longest is None:
-        if len(run) == 1 or count == 1:
-            return count
-        longest = _longest(profile, run[0])
-    if reading.single_words_only or count > longest:
+    if reading.single_words_only or count > _longest(profile, run[0]):
         return None
     if not reading.gaps_readable and not _all_known(profile, run[0], count, unreadable):
         return None

@@ -150,16 +150,11 @@ class Simulation:
         self._add(endpoint)
         return endpoint.address
 
-    def serve_stream(
-        self, stream: ByteStream, client: Callable[[], ClientSettings] | None = None
-    ) -> None:
-        """Serve the line on an opened port, which is closed at the end.
-
-        `client` holds the settings of the other side, if visible.
-        """
+    def serve_stream(self, stream: ByteStream) -> None:
+        """Serve the line on an opened port, which is closed at the end."""
 
         def paced() -> Conversation:
-            return RtuConversation(self.line, self.faults, paced=True, client=client)
+            return RtuConversation(self.line, self.faults, paced=True)
 
         self._add(StreamEndpoint(paced, stream))
 

@@ -14,7 +14,6 @@ from rich.text import Text
 from tui.drive.plain import plain
 
 from .palette import (
-    ALARM,
     ATTENTION_BLOCK,
     FAINT,
     KEY,
@@ -167,10 +166,10 @@ def key_line(
     return text
 
 
-def armed_text(armed: float | None, *, lost: bool = False) -> Text:
-    """Return `ARMED` with the remaining seconds, or `NOT ARMED`; in amber if arming was `lost`."""
+def armed_text(armed: float | None) -> Text:
+    """Return `ARMED` with the remaining seconds, or `NOT ARMED`."""
     if armed is None:
-        return Text(" NOT ARMED  ", ALARM if lost else STRONG)
+        return Text(" NOT ARMED  ", STRONG)
     return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
 
 

@@ -208,7 +208,7 @@ async def _tell(
     from tui.session.settings.restore import held_by
 
     source = library.load(values.head.profile)
-    held = await held_by(session, counter("Read"))
+    held = await held_by(session, counter())
     plan = plan_restore(session.profile, held, values, source, options)
     if newest is not None:
         from ..running.predecessor import say_predecessor
@@ -308,7 +308,7 @@ async def _restore(
 
     source, messages = library.load(values.head.profile), telling.messages
     if session.line.read_only:
-        plan = await plan_for(session, values, source, options, counter("Read"))
+        plan = await plan_for(session, values, source, options, counter())
         if len(plan.edits) or save:
             raise RequestRefused("The line is read-only: nothing is written.")
         say_plan_left_out(plan, messages)
@@ -323,7 +323,7 @@ async def _restore(
             await refuse_frequent_save(session, gate)
         done = await bring_back(
             session, journal, values, source, options, permit=permit,
-            progress=telling, reading=counter("Read"), gate=gate,
+            progress=telling, reading=counter(), gate=gate,
         )  # fmt: skip
         say_plan_left_out(done.plan, messages)
         for link in done.links:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 import re
 import socket
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from urllib.parse import unquote, urlsplit
 
 import click
@@ -105,10 +104,10 @@ def level(text: str) -> str:
     return NO_LEVEL.sub("_", text).strip("_") or "_"
 
 
-def need_mqtt(load: Callable[[str], Any] = __import__) -> None:
+def need_mqtt() -> None:
     """Raise Failure with advice if the package for MQTT is not installed."""
     try:
-        load("aiomqtt")
+        __import__("aiomqtt")
     except ImportError as error:
         raise Failure(
             "MQTT needs the package aiomqtt. Install it: pip install 'drivepanel[mqtt]'.",

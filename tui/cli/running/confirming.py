@@ -52,7 +52,7 @@ def confirm_profile(
             wanted = [session.profile.find(code).code for code in codes]
             kind = await _kind(opened)
             test = Conformance(session)
-            await test.run(counter("Read"))
+            await test.run(counter())
             for code in (wanted or test.codes_to_ask()) if may_ask() else wanted:
                 await _ask_display(test, code)
         evidence = _evidence(session, test.findings, kind)

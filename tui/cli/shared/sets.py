@@ -157,7 +157,7 @@ async def take_set(session: DriveSession, *, settings_only: bool = False) -> Par
         except ExchangeError:
             session.identity = None
     codes = setting_codes(session.profile) if settings_only else []
-    upload = Upload(session, codes, progress=counter("Read"))
+    upload = Upload(session, codes, progress=counter())
     await read_out(upload)
     return upload.parameter_set()
 
@@ -182,13 +182,13 @@ async def read_out(upload: Upload) -> None:
                 await asyncio.sleep(SET_POLL_INTERVAL)
 
 
-def counter(what: str) -> Callable[[int, int], None] | None:
-    """Shows progress in one line of a terminal; None without a terminal."""
+def counter() -> Callable[[int, int], None] | None:
+    """Shows the progress of reading in one line of a terminal; None without a terminal."""
     if not sys.stderr.isatty():
         return None
 
     def show(done: int, of: int) -> None:
-        say_over(f"{what}: {done} of {of}", last=done >= of)
+        say_over(f"Read: {done} of {of}", last=done >= of)
 
     return show
 

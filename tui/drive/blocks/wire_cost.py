@@ -219,19 +219,16 @@ def best_assignment(
     codes: Sequence[str],
     timing: WireTiming,
     others: Mapping[str, int],
-    unreadable: Collection[str] = (),
 ) -> Assignment:
     """Return the assignment of a block with which these parameters are read fastest.
 
     A greedy search fills the slots one by one, and returns the best of all lengths, because the
     first slots may cost more than they save. `others` are the slots of other blocks.
     """
-    left = [code for code in codes if code not in unreadable]
-    left = [code for code in left if not reason_against(profile, block, profile[code])]
+    left = [code for code in codes if not reason_against(profile, block, profile[code])]
 
     def takes(plan: Assignment) -> int:
-        slots = {**others, **plan.slots}
-        return cost(profile, codes, timing, slots, unreadable).microseconds
+        return cost(profile, codes, timing, {**others, **plan.slots}).microseconds
 
     plan = best = empty(block)
     least = takes(plan)

@@ -95,15 +95,10 @@ def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:
         raise MappingError(f"Not in effect yet: {', '.join(found)}. Reset the drive first.")
 
 
-def values_text(
-    profile: Profile,
-    values: Mapping[str, int],
-    raws: Mapping[str, int],
-    absent: Collection[str] = (),
-) -> str:
-    """Return codes with their values in one line; `absent` are codes that the drive lacks."""
+def values_text(profile: Profile, values: Mapping[str, int], raws: Mapping[str, int]) -> str:
+    """Return codes with their values in one line."""
     return ", ".join(
-        f"{c} {shown_text(profile, profile[c], raw, raws, absent)}" for c, raw in values.items()
+        f"{c} {shown_text(profile, profile[c], raw, raws)}" for c, raw in values.items()
     )
 
 
