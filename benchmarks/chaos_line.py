@@ -31,8 +31,8 @@ from tests.line.pty_panel import COLUMNS, COMMAND, LINE_SETTLED, ROWS, RUN, star
 from tests.programs import DRIVEPANEL, is_running, wait_until
 from tui.simulator import DriveSpec, LineTiming, Simulation
 from tui.simulator.server.client_settings import ClientSettings
+from tui.simulator.server.conversation import PendingReply, SimulatedLine
 from tui.simulator.server.frames import is_sealed
-from tui.simulator.server.line import PendingReply, SimulatedLine
 
 COUNTER, STEP = "PTH", 0.05
 """A word of drive 2 that counts steps of so many seconds."""

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.session.test_report_page import wide_page
-from tui.session.page_forms import pages_html
+from tui.session.report_page import pages_html
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 A4 = (595, 842)

@@ -14,20 +14,18 @@ from tui.drive.settings.parameter_set import ParameterSet, SetHead
 from tui.session.acceptance.result import settings_hash
 from tui.session.connect.named_lines import ReportNames, line_settings, settings_file
 from tui.session.journal import FAULT_WHYS, Entry
-from tui.session.page_forms import (
+from tui.session.read.upload import setting_codes
+from tui.session.report_page import (
     ROWS_A4,
     ROWS_TEXT,
     TEXT_WIDTH,
+    TRIPS_SHOWN,
+    ReportPage,
+    ReportSection,
     page_form,
     pages_html,
     pages_markdown,
     pages_text,
-)
-from tui.session.read.upload import setting_codes
-from tui.session.report_page import (
-    TRIPS_SHOWN,
-    ReportPage,
-    ReportSection,
     report_page,
     unread_page,
 )

@@ -11,8 +11,8 @@ from __future__ import annotations
 from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile
 from tui.simulator import DriveSpec, LineTiming, SimulatedDrive
+from tui.simulator.server.conversation import SimulatedLine
 from tui.simulator.server.frames import seal
-from tui.simulator.server.line import SimulatedLine
 
 STEP = 0.02
 ADDRESS = 2

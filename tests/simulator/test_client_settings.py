@@ -12,10 +12,9 @@ from contextlib import contextmanager
 import pytest
 
 from tui.simulator import ClientSettings, DriveSpec, LineTiming, Simulation
-from tui.simulator.server.conversation import RtuConversation
+from tui.simulator.server.conversation import RtuConversation, SimulatedLine
 from tui.simulator.server.faults import FaultPlan
 from tui.simulator.server.frames import seal
-from tui.simulator.server.line import SimulatedLine
 from tui.simulator.troubles import FaultRates
 
 from .exchange import Exchange

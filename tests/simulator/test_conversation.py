@@ -5,10 +5,14 @@ from __future__ import annotations
 import pytest
 
 from tui.simulator import DriveSpec, FaultRates, LineTiming, SimulatedDrive
-from tui.simulator.server.conversation import SILENCE_ENDS_FRAME, RtuConversation, TcpConversation
+from tui.simulator.server.conversation import (
+    SILENCE_ENDS_FRAME,
+    RtuConversation,
+    SimulatedLine,
+    TcpConversation,
+)
 from tui.simulator.server.faults import FaultPlan
 from tui.simulator.server.frames import seal
-from tui.simulator.server.line import SimulatedLine
 
 from .small import PROFILES
 

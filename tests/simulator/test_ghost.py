@@ -6,10 +6,9 @@ import pytest
 
 from tui.simulator import DriveSpec, LineTiming, Simulation, SimulatorError
 from tui.simulator.ghost import GhostDrive, RecordedExchange
-from tui.simulator.server.conversation import RtuConversation, TcpConversation
+from tui.simulator.server.conversation import RtuConversation, SimulatedLine, TcpConversation
 from tui.simulator.server.faults import FaultPlan
 from tui.simulator.server.frames import seal
-from tui.simulator.server.line import SimulatedLine
 from tui.simulator.troubles import FaultRates
 
 from .small import PROFILES

@@ -8,8 +8,8 @@ import pytest
 
 from tui.simulator import DriveSpec, LineTiming, SimulatedDrive, SimulatorError
 from tui.simulator.server.answering import in_group
+from tui.simulator.server.conversation import SimulatedLine
 from tui.simulator.server.frames import seal
-from tui.simulator.server.line import SimulatedLine
 
 from .small import PROFILES
 

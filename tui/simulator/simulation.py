@@ -15,10 +15,9 @@ from .drive import SimulatedDrive
 from .errors import SimulatorError
 from .ghost import GhostDrive
 from .server.client_settings import ClientSettings
-from .server.conversation import Conversation, RtuConversation, TcpConversation
+from .server.conversation import Conversation, RtuConversation, SimulatedLine, TcpConversation
 from .server.endpoints import ByteStream, Endpoint, PtyEndpoint, StreamEndpoint, TcpEndpoint
 from .server.faults import FaultPlan
-from .server.line import SimulatedLine
 from .spec import DriveSpec, LineTiming
 from .troubles import FaultRates, Habits
 

@@ -47,7 +47,7 @@ class PageWriter:
         A drive that cannot be read has a page that says why, if another one can.
         """
         from tui.session.connect.named_lines import line_settings
-        from tui.session.page_forms import page_form
+        from tui.session.report_page import page_form
         from tui.session.stored_results import results_in
 
         standard = self.file == STANDARD

@@ -145,8 +145,8 @@ class SetKeys(ParameterKeys):
         """Ask for a file, read everything, and write a report for a customer."""
         from tui.drive.settings.set_file import write_file
         from tui.session.journal_reading import entries_of
-        from tui.session.page_forms import PAGE_SUFFIXES, page_text
         from tui.session.report import report_text
+        from tui.session.report_page import PAGE_SUFFIXES, page_text
         from tui.session.report_trends import linked, report_trend_lines, report_trends, trend_files
         from tui.session.startup.lines import start_up_lines
 
