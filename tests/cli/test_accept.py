@@ -10,7 +10,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from tui.cli.running import asking, keyboard
+from tui.cli.running import keyboard
+from tui.cli.shared import asking
 from tui.simulator import DriveSpec, Simulation
 
 from .commands import ended, refused, run, tcp_line

@@ -79,3 +79,21 @@ def test_giving_back_control_of_a_family_without_it_stops_and_exits_with_6() -> 
 def test_status_omits_control_for_a_family_without_it() -> None:
     assert "Control  " not in run(0, "status", "sim:atv71@1")
     assert json.loads(run(0, "status", "sim:atv71@1", "--json"))["control"] is None
+
+
+@pytest.mark.parametrize(("answer", "status"), [(True, 0), (False, 5)])
+def test_unproved_profile_writes_only_if_a_person_confirms_it(
+    monkeypatch: pytest.MonkeyPatch, answer: bool, status: int
+) -> None:
+    questions: list[str] = []
+
+    async def answered(question: str) -> bool:
+        questions.append(question)
+        return answer
+
+    monkeypatch.setattr("tui.cli.shared.options.may_ask", lambda: True)
+    monkeypatch.setattr("tui.cli.shared.options.says_yes", answered)
+    result = invoked("write", "sim:ms300", "-p", "ms300", "01-00=50", "--arm")
+    assert result.exit_code == status, result.stderr
+    (question,) = questions
+    assert question.endswith("Write to device 1?")

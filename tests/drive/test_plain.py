@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.drive.plain import commands, plain
+from tui.drive.plain import commands, markdown_table, plain
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,11 @@ def test_replacement_keeps_the_length_and_leaves_no_control_character(text: str)
     assert not any(commands(character) for character in shown)
     assert plain(shown) == shown
     shown.encode("utf-8")
+
+
+def test_cell_of_markdown_ends_neither_its_column_nor_its_row() -> None:
+    assert markdown_table(("a|b", "c"), [("1\n2", "\x1b|")]) == [
+        r"| a\|b | c |",
+        "|---|---|",
+        r"| 1 2 | ␛\| |",
+    ]

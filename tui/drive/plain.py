@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 import unicodedata
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 PICTURES = 0x2400
 """Offset of the Unicode pictures of the first 32 control characters: ␀ to ␟."""
@@ -29,6 +29,17 @@ def plain(text: str, *, lines: bool = False) -> str:
 def plain_cells(cells: Iterable[object]) -> list[str]:
     """Return the cells of a table row as sanitized text; empty for None."""
     return ["" if cell is None else plain(str(cell)) for cell in cells]
+
+
+def markdown_cell(text: str) -> str:
+    """Return a text that ends neither the column nor the row of a Markdown table."""
+    return plain(text.replace("\n", " ")).replace("|", "\\|")
+
+
+def markdown_table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    """Return the lines of a Markdown table."""
+    lines = [f"| {' | '.join(map(markdown_cell, row))} |" for row in (head, *rows)]
+    return [lines[0], "|" + "---|" * len(head), *lines[1:]]
 
 
 def escaped_json(text: str) -> str:

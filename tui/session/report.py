@@ -12,7 +12,7 @@ from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
 from tui.drive.hints import advice_now, hint_markdown, reset_text
 from tui.drive.model import model_read
-from tui.drive.plain import plain
+from tui.drive.plain import markdown_cell, markdown_table, plain
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
@@ -93,10 +93,12 @@ class ReportParts:
     def head(self) -> list[str]:
         """Return the identity of the drive, and when and where it was read."""
         head = self.values.head
-        known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
+        known = [
+            f"- {key.capitalize()}: {markdown_cell(text)}" for key, text in head.identity.items()
+        ]
         model = model_read(self.profile, self.values.raws)
         absent = len(self.values.absent)
-        known += [f"- Model by its own code: {_cell(model)}"] if model else []
+        known += [f"- Model by its own code: {markdown_cell(model)}"] if model else []
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
             "",
@@ -292,14 +294,8 @@ def _zone_of(text: str) -> tzinfo:
 
 def table_markdown(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
     """Return rows as a Markdown table; "None." without a row."""
-    lines = ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows]
-    if not lines:
-        return ["None."]
-    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *lines]
-
-
-def _cell(text: str) -> str:
-    return text.replace("|", "\\|").replace("\n", " ")
+    lines = markdown_table(head, rows)
+    return lines if len(lines) > 2 else ["None."]
 
 
 @dataclass(frozen=True, slots=True)

@@ -264,8 +264,8 @@ class AcceptSession:
 
     async def _confirm(self, console: DriveConsole, ending: Ending, high: HighSpeed | None) -> None:
         """Show what will move; arm after a yes. Raises Failure, with nothing written."""
-        from ..running.asking import says_yes
         from ..running.keyboard import ended_by_typing
+        from ..shared.asking import says_yes
 
         _may_arm(console)
         self._need_standstill(console)
@@ -302,8 +302,8 @@ class AcceptSession:
 
     async def _ask_turned(self, question: str) -> str:
         """Ask which way the motor turned; return nothing for any answer but r and l."""
-        from ..running.asking import typed_answer
         from ..running.keyboard import ended_by_typing
+        from ..shared.asking import typed_answer
 
         self._stack.close()  # what is typed now is the answer
         try:

@@ -96,7 +96,7 @@ def prove(
 
 async def _ask_on_the_run(device: int) -> None:
     """A motor that turns is left to its drive only with a yes; raises Failure without one."""
-    from ..running.asking import may_ask, says_yes
+    from ..shared.asking import may_ask, says_yes
 
     if not may_ask():
         raise Failure(f"{ON_THE_RUN} --yes says that this is meant.", REFUSED_HERE)

@@ -304,7 +304,7 @@ async def _restore(
     from tui.session.settings.restore import Mark, plan_for
     from tui.session.settings.restore import restore_set as bring_back
 
-    from ..running.asking import wear_gate
+    from ..shared.asking import wear_gate
 
     source, messages = library.load(values.head.profile), telling.messages
     if session.line.read_only:

@@ -205,7 +205,7 @@ async def _write(
     from tui.session.settings.apply import apply_edits
     from tui.session.settings.eeprom import refuse_frequent_save, save_to_eeprom
 
-    from ..running.asking import wear_gate
+    from ..shared.asking import wear_gate
 
     messages = telling.messages
     if not len(edits):

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import tui
 from tui.drive.sentences import counted
 
+from ..shared.asking import may_ask, says_yes, typed_answer
 from ..shared.drive_commands import watched
 from ..shared.errors import DIFFERENT, DONE, Failure
 from ..shared.options import Target, on_line
@@ -18,7 +19,6 @@ from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.sets import counter, write_down
 from ..shared.standard_streams import STANDARD
-from .asking import may_ask, says_yes, typed_answer
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import EvidenceFinding, Parameter, ProfileEvidence

@@ -10,7 +10,7 @@ from contextlib import contextmanager, suppress
 
 from tui.session.running.ending import Ending
 
-from .asking import may_ask
+from ..shared.asking import may_ask
 
 
 def person_is_here() -> bool:

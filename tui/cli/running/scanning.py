@@ -11,10 +11,10 @@ from typing import TYPE_CHECKING
 from tui.bus.errors import PortRefused
 from tui.drive.finding import LineSetting
 
+from ..shared.asking import may_ask, says_yes
 from ..shared.errors import REFUSED_HERE, Failure
 from ..shared.line_argument import mind_the_drive
 from ..shared.pending_timeouts import look_after, timeout_warning
-from .asking import may_ask, says_yes
 from .scan_telling import Hit, Progress, ScanTelling
 
 if TYPE_CHECKING:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import asyncio
 import functools
-import sys
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
+from .asking import may_ask, says_yes
 from .completion import complete_profile
 from .line_argument import LineArgument, mind_the_drive, mind_the_line, takes_line_as
 from .looking_after import guard_motors, say_shared, to_its_end
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
-from .say import say, say_prompt
+from .say import say
 from .signals import never_suspended
 from .silence import about_silence, wait_for_state
 
@@ -307,12 +307,9 @@ async def _confirm_unproved(session: DriveSession) -> None:
     context = click.get_current_context(silent=True)
     if not session.is_unconfirmed or context is None or not context.params.get("arm"):
         return
-    if sys.stdin.isatty() and sys.stderr.isatty():
-        say_prompt(f"{session.arming.barred} Write to device {session.device}? [y/N]")
-        answer = await asyncio.to_thread(sys.stdin.readline)
-        if answer.strip().casefold() in ("y", "yes"):
-            session.confirm_profile()
-            return
+    if may_ask() and await says_yes(f"{session.arming.barred} Write to device {session.device}?"):
+        session.confirm_profile()
+        return
     session.arming.barred = (
         f"Not armed: the profile {session.profile.id} is unproved ({proof_text(session.profile)}),"
         " and no person at a terminal. For a script, make a profile of your own and prove it:"

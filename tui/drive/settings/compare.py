@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Literal
 
-from ..plain import plain, plain_cells
+from ..plain import markdown_table, plain_cells
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import shown
@@ -189,13 +189,8 @@ def _cells(row: ComparedRow) -> tuple[str, str, str, str, str, str]:
 
 def _markdown(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
     head = ("differs", "code", "name", *labels, "remark")
-    lines = [_bar(head), "|" + "---|" * len(head)]
-    lines += [_bar(("yes" if row.differs else "", *_cells(row)[1:])) for row in rows]
-    return "\n".join(lines) + "\n"
-
-
-def _bar(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(plain(cell).replace("|", "\\|") for cell in cells) + " |"
+    cells = (("yes" if row.differs else "", *_cells(row)[1:]) for row in rows)
+    return "\n".join(markdown_table(head, cells)) + "\n"
 
 
 def _csv(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:

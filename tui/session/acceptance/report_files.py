@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime
 from xml.sax.saxutils import escape, quoteattr
 
-from tui.drive.plain import plain
+from tui.drive.plain import markdown_table, plain
 
 from .curve import curve_svg
 from .result import AcceptanceResult, StepResult
@@ -50,9 +50,9 @@ def result_markdown(result: AcceptanceResult, curves: Mapping[int, tuple[str, st
         f"- SHA-256 of the settings: {result.settings_hash or 'none'}",
         f"- Drive Panel {result.panel}; profile {result.profile}, version {result.profile_version}",
         "",
-        *_table(
+        *markdown_table(
             ("step", "name", "result", "s"),
-            ((s.number, s.title, s.outcome, f"{s.seconds:.1f}") for s in result.steps),
+            ((str(s.number), s.title, s.outcome, f"{s.seconds:.1f}") for s in result.steps),
         ),
     ]
     for step in result.steps:
@@ -67,15 +67,10 @@ def _step_lines(step: StepResult, curves: Mapping[int, tuple[str, str]]) -> list
         lines += [step.text, ""]
     if step.checks:
         rows = ((c.name, c.value, c.limit, _PASSED[c.passed]) for c in step.checks)
-        lines += [*_table(("check", "value", "allowed", "result"), rows), ""]
+        lines += [*markdown_table(("check", "value", "allowed", "result"), rows), ""]
     if step.number in curves:
         lines += [f"![Curve of step {step.number}]({curves[step.number][0]})", ""]
     return lines[:-1]
-
-
-def _table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
-    cells = [[str(cell).replace("|", "\\|").replace("\n", " ") for cell in row] for row in rows]
-    return [f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *cells)]
 
 
 def result_junit(result: AcceptanceResult) -> str:

@@ -13,7 +13,7 @@ from datetime import datetime
 
 from tui.drive.causes import KnownValues
 from tui.drive.hints import advice, hint_markdown, reset_text
-from tui.drive.plain import plain
+from tui.drive.plain import markdown_table, plain
 from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
 
@@ -182,19 +182,16 @@ def record_text(
     lines += [f"- Remedy: {fault.remedy}"] if fault and fault.remedy else []
     lines += _pointed_at(session, fault, values or {}, known or KnownValues(before=record.raws))
     if stored:
-        lines += ["", "## Stored by the drive", "", "| code | name | value |", "|---|---|---|"]
-        lines += [f"| {code} | {name} | {value} |" for code, name, value in stored]
+        lines += ["", "## Stored by the drive", ""]
+        lines += markdown_table(("code", "name", "value"), stored)
     lines += ["", f"## Values of the last {SECONDS_KEPT:g} s", ""]
     lines.append(f"| time | state | {' | '.join(record.headings)} |")
     lines.append("|---|---|" + "---:|" * len(record.headings))
     lines += [f"| {_clock(m.wall)} | {m.state} | {' | '.join(m.texts)} |" for m in record.moments]
     lines += ["", f"## Writes by Drive Panel in the last {SECONDS_KEPT:g} s", ""]
-    if record.writes:
-        lines += ["| time | code | old | new | answer | why |", "|---|---|---|---|---|---|"]
-    lines += [
-        f"| {e.time[11:23]} | {e.code} | {e.old} | {e.new} | {e.answer} | {e.why} |"
-        for e in record.writes
-    ] or ["Nothing."]
+    head = ("time", "code", "old", "new", "answer", "why")
+    rows = [(e.time[11:23], e.code, e.old, e.new, e.answer, e.why) for e in record.writes]
+    lines += markdown_table(head, rows) if rows else ["Nothing."]
     return plain("\n".join(lines) + "\n", lines=True)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Collection
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from ..shared.say import Messages, say_prompt
+from .say import Messages, say_prompt
 
 if TYPE_CHECKING:
     from tui.session.journal import Journal
