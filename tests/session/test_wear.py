@@ -138,7 +138,7 @@ def test_counts_that_cannot_be_stored_leave_the_file_whole(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("tui.session.eeprom_counts.os.fsync", full)
+        patch.setattr("os.fsync", full)
         with pytest.raises(OSError, match="No space"):
             counts.add([write(1)])
     assert counts_of(counts).saves.count == 1

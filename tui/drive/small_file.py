@@ -1,4 +1,4 @@
-"""Bounded reads of files that a person names, or that Drive Panel stores.
+"""Bounded reads of files that a person names or that Drive Panel stores, and complete writes.
 
 A pipe would block its reader forever, and a device such as /dev/zero would fill the memory.
 """
@@ -9,11 +9,14 @@ import codecs
 import errno
 import os
 import stat
+from contextlib import suppress
 from pathlib import Path
 
 supplied: dict[Path, bytes] = {}
 """Content to read in place of a file, by path: what a command has read from standard input."""
 
+NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
+"""Errors of file systems that cannot flush a folder; the file itself was flushed."""
 LONGEST_TEXT = 2_000_000
 """Most bytes of a profile, a parameter set, a block file, or a file of Drive Panel."""
 
@@ -50,6 +53,37 @@ def read_small_text(path: Path, longest: int = LONGEST_TEXT) -> str:
 def decoded_text(data: bytes) -> str:
     """Decode a text, with line ends as `\\n`. Raises UnicodeDecodeError."""
     return data.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+
+
+def replace_file(path: Path, data: bytes, *, flushed: bool = True) -> None:
+    """Write a file completely or leave it unchanged; `flushed` to the disk. Raises OSError."""
+    part = path.with_suffix(f".{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            if flushed:
+                file.flush()
+                os.fsync(file.fileno())
+        part.replace(path)
+        if flushed:
+            sync_folder(path.parent)
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the names in a folder, if the system supports it. Raises OSError."""
+    if os.name != "posix":
+        return
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(opened)
+    except OSError as error:
+        if error.errno not in NOT_SYNCED:
+            raise
+    finally:
+        os.close(opened)
 
 
 def encoding_fault(data: bytes) -> str:

@@ -7,19 +7,16 @@ for the disk. A crash loses at most the writes that were not added yet; the file
 from __future__ import annotations
 
 import logging
-import os
 from collections.abc import Iterable, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import msgspec
 
-from tui.drive.small_file import read_small
+from tui.drive.small_file import read_small, replace_file
 
 from .connect.line_key import line_key
 from .journal_file import folder_turn
-from .starts.files import sync_folder
 from .stored import make_folder
 
 COUNTS_NAME = "eeprom-writes.json"
@@ -127,7 +124,8 @@ class EepromCounts:
             for write in writes:
                 _count(drives, write)
             drives.sort(key=lambda drive: drive.last)
-            self._store(_Counts(drives[-DRIVES_KEPT:]))
+            counts = msgspec.json.encode(_Counts(drives[-DRIVES_KEPT:]))
+            replace_file(self.path, msgspec.json.format(counts, indent=1))
 
     def _read(self) -> list[DriveCounts]:
         try:
@@ -141,19 +139,6 @@ class EepromCounts:
         while (aside := self.path.with_suffix(f".damaged{number}")).exists():
             number += 1
         return self.path.rename(aside)
-
-    def _store(self, counts: _Counts) -> None:
-        part = self.path.with_suffix(f".{os.getpid()}.part")
-        try:
-            with part.open("wb") as file:
-                file.write(msgspec.json.format(msgspec.json.encode(counts), indent=1))
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(self.path)
-            sync_folder(self.path.parent)
-        finally:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
 
 
 def _count(drives: list[DriveCounts], write: EepromWrite) -> None:

@@ -17,7 +17,8 @@ from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 
-from .starts.files import sync_folder
+from tui.drive.small_file import sync_folder
+
 from .stored import make_folder
 
 try:

@@ -7,7 +7,7 @@ import json
 import os
 from pathlib import Path
 
-from tui.drive.small_file import read_small_text
+from tui.drive.small_file import read_small_text, replace_file
 
 NOWHERE = Path(os.devnull) / "no home folder is known: name a folder in DRIVEPANEL_STATE"
 """Path for a missing state folder: every use of it fails, with its name as the reason."""
@@ -38,7 +38,5 @@ def stored_json(file: Path) -> object:
 def store_json(file: Path, what: object) -> None:
     """Write a JSON file completely or not at all. Raises OSError."""
     make_folder(file.parent)
-    part = file.with_suffix(".part")
     # JSON escapes keep lone surrogates, which UTF-8 cannot encode
-    part.write_text(json.dumps(what, indent=1), encoding="utf-8")
-    part.replace(file)
+    replace_file(file, json.dumps(what, indent=1).encode(), flushed=False)

@@ -18,7 +18,7 @@ from ..profile import library
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import raw_of_text, shown
-from ..small_file import read_small_text
+from ..small_file import read_small_text, sync_folder
 from ..toml_text import toml_tables
 from ..values import type_range
 from .parameter_set import (
@@ -320,7 +320,8 @@ def write_file(
             file.flush()
             os.fsync(file.fileno())
         _put(part, path, force=force)
-        _sync_folder(path.parent)
+        with suppress(OSError):
+            sync_folder(path.parent)
     except OSError as error:
         raise SetError(f"{path}: cannot be written: {error.strerror or error}.") from error
     finally:
@@ -342,15 +343,3 @@ def _put(part: Path, path: Path, *, force: bool) -> None:
     except (OSError, NotImplementedError):
         # the file system has no links; the name was free at the check before
         part.replace(path)
-
-
-def _sync_folder(folder: Path) -> None:
-    """Flush the folder to disk, so that the name survives a power loss, if supported."""
-    if os.name != "posix":
-        return
-    with suppress(OSError):
-        handle = os.open(folder, os.O_RDONLY)
-        try:
-            os.fsync(handle)
-        finally:
-            os.close(handle)

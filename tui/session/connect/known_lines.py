@@ -19,6 +19,7 @@ from tui.drive.profile.library import version_shown
 from tui.drive.small_file import read_small_text
 
 from ..paths import state_folder
+from ..stored import store_json
 from .line_key import line_key
 
 LINES_KEPT = 60
@@ -147,11 +148,7 @@ def keep_memory(memory: LinesMemory) -> None:
         for key, mark in list(memory.lines.items())[:LINES_KEPT]
     }
     names = dict(list(memory.names.items())[:NAMES_KEPT])
-    file = memory_file()
-    file.parent.mkdir(parents=True, exist_ok=True)
-    part = file.with_suffix(f".{os.getpid()}.part")
-    part.write_text(json.dumps({"lines": lines, "names": names}, indent=1), encoding="utf-8")
-    part.replace(file)
+    store_json(memory_file(), {"lines": lines, "names": names})
 
 
 def _table(name_text: Mapping[str, Any], key: str) -> dict[str, Any]:

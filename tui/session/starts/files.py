@@ -7,7 +7,6 @@ after their program has ended.
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import logging
 import os
@@ -17,7 +16,7 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from tui.drive.small_file import read_small
+from tui.drive.small_file import read_small, sync_folder
 
 from ..connect.share_place import group_folder
 from ..paths import state_folder
@@ -32,8 +31,6 @@ LONGEST_RECORD = 100_000
 SHARED_RECORD, SHARED_RECORDS = 0o660, 0o770
 """Modes of a file and a folder that users of a group share; the group is that of the parent
 folder."""
-NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
-"""Errors of file systems that cannot flush a folder; the file itself was flushed."""
 
 
 class StartFiles:
@@ -143,20 +140,6 @@ def _read(path: Path) -> StartRecord | None:
         with suppress(OSError):
             path.replace(path.with_suffix(".damaged"))
     return None
-
-
-def sync_folder(folder: Path) -> None:
-    """Flush the names in a folder, if the system supports it."""
-    if os.name != "posix":
-        return
-    opened = os.open(folder, os.O_RDONLY)
-    try:
-        os.fsync(opened)
-    except OSError as error:
-        if error.errno not in NOT_SYNCED:
-            raise
-    finally:
-        os.close(opened)
 
 
 def start_records(folder: Path | None) -> StartFiles | StartFolders:

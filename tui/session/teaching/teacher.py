@@ -9,11 +9,9 @@ import asyncio
 import hashlib
 import json
 import logging
-import os
 import re
 import threading
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
@@ -22,7 +20,7 @@ from typing import TYPE_CHECKING
 from tui.drive.errors import DriveError, ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.sentences import all_of
-from tui.drive.small_file import read_small_text
+from tui.drive.small_file import read_small_text, replace_file
 from tui.drive.taught_profile import reference_of, why_no_reference, why_not_taught, with_taught
 from tui.drive.teaching import (
     LOOKS_KEPT,
@@ -130,16 +128,7 @@ def keep_taught(drive: TaughtDrive, kept: TaughtLooks) -> None:
     try:
         make_folder(path.parent)
         _set_aside_if_damaged(drive, path)
-        part = path.with_suffix(f".{os.getpid()}.part")
-        try:
-            with part.open("w", encoding="utf-8") as file:
-                json.dump(_as_json(drive, kept), file, indent=1)
-                file.flush()
-                os.fsync(file.fileno())
-            part.replace(path)
-        finally:
-            with suppress(OSError):
-                part.unlink(missing_ok=True)
+        replace_file(path, json.dumps(_as_json(drive, kept), indent=1).encode())
     except OSError as error:
         raise TaughtNotKept(
             f"The learned scales are lost when this program ends: {path} cannot be written"
