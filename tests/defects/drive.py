@@ -5,6 +5,8 @@ from __future__ import annotations
 from .defect import Defect
 
 EDITOR = "tests/session/test_editor.py"
+MAKES = "tests/session/test_other_makes.py"
+SEQUENCES = "tests/session/test_sequences.py"
 
 DEFECTS = (
     Defect(
@@ -46,6 +48,54 @@ DEFECTS = (
         "        if ways == [None]:",
         "A motor runs by a profile that has no way to stop it.",
         ("tests/drive/test_profile_check.py",),
+    ),
+    Defect(
+        "half-of-32-bits-passes-as-a-stop",
+        "tui/drive/foreign_write.py",
+        "if is_field(parameter) or any(address not in words for address in own):",
+        "if is_field(parameter) or own[0] not in words:",
+        "Half a command word of 32 bits from a client counts as a whole command.",
+        (f"{MAKES}::test_half_of_a_command_word_of_32_bits_is_no_stop_of_a_client",),
+    ),
+    Defect(
+        "unread-word-of-a-state-ignored",
+        "tui/drive/chart.py",
+        "return state if None not in held else UNKNOWN",
+        "return state",
+        "A motor counts as running or at rest although a word that decides was not read.",
+        (f"{MAKES}::test_state_of_two_words_is_unknown_until_the_deciding_one_is_read",),
+    ),
+    Defect(
+        "standstill-from-an-old-word",
+        "tui/session/read/reader.py",
+        "if read.issuperset(status) else [None]",
+        "if read.intersection(status) else [None]",
+        "An old second word with a new first one clears the record of a running motor.",
+        (f"{MAKES}::test_standstill_is_not_noted_from_a_new_and_an_old_word",),
+    ),
+    Defect(
+        "half-a-sequence-is-not-stopped",
+        "tui/session/command/access.py",
+        "if order.id in NOT_STOPPED_AFTER:",
+        "if order.id not in NOT_STOPPED_AFTER:",
+        "A start that ends half way leaves the motor to whatever its first word does.",
+        (SEQUENCES,),
+    ),
+    Defect(
+        "lost-first-word-of-a-sequence-is-not-stopped",
+        "tui/session/command/access.py",
+        "or not order.waits or not (sent or unsure):",
+        "or not order.waits or not sent:",
+        "The first word of a start may have been taken, and nothing stops the motor.",
+        (SEQUENCES,),
+    ),
+    Defect(
+        "stop-may-wait",
+        "tui/drive/profile/rules/charts.py",
+        'if order.id in (*SURE_STOPS, "emergency-stop"):',
+        "if False:",
+        "A profile may give its stop a wait of seconds.",
+        (SEQUENCES,),
     ),
     Defect(
         "hidden-state-not-told",

@@ -15,6 +15,7 @@ from tui.bus.errors import NoAnswer
 from tui.drive.profile import library
 from tui.drive.profile.check import examined
 from tui.session.command.access import HalfSent
+from tui.session.running.watching import outcome_of
 from tui.session.work import OutcomeKind
 from tui.simulator.proving.proof_bench import ProofBench
 from tui.simulator.proving.proof_steps import prove_profile
@@ -65,8 +66,9 @@ def commands(made: Bench) -> list[tuple[int, int]]:
 
 async def test_sequence_waits_for_the_state_before_its_next_word() -> None:
     async with primed('{ states = ["primed"], ms = 1000 }') as made:
-        made.commander.run("forward", "20Hz")
-        assert await made.done() == "Run: Running"
+        outcome = await outcome_of(made.commander, lambda: made.commander.run("forward", "20Hz"))
+        assert outcome is not None
+        assert outcome.text == "Run: Running"
         assert commands(made) == [PRIME, RUN]
 
 
@@ -76,8 +78,9 @@ async def test_state_that_is_not_reached_ends_the_sequence_with_a_stop() -> None
         made.commander.run("forward", "20Hz")
         text = await made.done(OutcomeKind.REFUSED)
         assert text == (
-            "Run ended after word 1 of 2. The drive did not reach Primed in 0.3 s; it is in Ready."
-            " The drive was sent its stop (Stop). Check that the motor has stopped."
+            "Run ended after word 1 of 2. The next step failed: The drive did not reach Primed in"
+            " 0.3 s; it is in Ready. The drive was sent its stop (Stop). Check that the motor has"
+            " stopped."
         )
         assert commands(made) == [PRIME, STOP]
 
@@ -86,6 +89,10 @@ async def test_stop_in_a_wait_is_sent_at_once_and_ends_the_sequence() -> None:
     async with primed("{ ms = 5000 }") as made:
         made.commander.run("forward", "20Hz")
         await made.until(lambda: commands(made) == [PRIME])
+        await made.until(lambda: made.commander.outcome is not None)
+        assert made.commander.outcome is not None
+        assert made.commander.outcome.kind is OutcomeKind.WORKING
+        assert made.commander.outcome.text == "Run: waiting 5 s"
         begun = made.clock.monotonic()
         made.stopper.stop([made.session])
         await made.until(lambda: STOP in commands(made))

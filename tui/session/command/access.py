@@ -30,7 +30,7 @@ from ..read.order_check import check_byte_order
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
-from ..work import Permit, Stopped
+from ..work import OutcomeKind, Permit, Stopped
 from .reference import Reference
 from .unblock_hint import block_reason_text
 
@@ -38,6 +38,8 @@ NO_CHART = (
     "Drive Panel does not command this drive: the words that select its commands were not read."
 )
 STATE_POLL_INTERVAL = 0.05
+LONG_WAIT = 1.0
+"""Seconds from which a wait in a command is reported."""
 
 
 NOT_STOPPED_AFTER: frozenset[OrderId] = frozenset({"take-control", "hand-back"})
@@ -130,24 +132,29 @@ class CommandAccess(Writer):
                     await self.write_parameter(parameter, raw, why=order.name)
                 sent = place + 1
                 if place < len(order.waits):
-                    await self._wait(chart, order.waits[place])
+                    await self._wait(chart, order, order.waits[place])
         except (LineError, DriveError) as error:
             # without a valid reply, the drive may have taken the word
             unsure = isinstance(error, ExchangeError) and not isinstance(error, DeviceException)
             if isinstance(error, Stopped) or not order.waits or not (sent or unsure):
                 raise
             ended = f"{order.name} ended after word {max(sent, 1)} of {len(order.words)}."
-            parts = (ended, sentence(str(error)), await self._stop_half(order))
+            why = f"The next step failed: {sentence(str(error))}"
+            parts = (ended, why, await self._stop_half(order))
             raise HalfSent(" ".join(filter(None, parts))) from error
 
-    async def _wait(self, chart: Chart, wait: OrderWait) -> None:
+    async def _wait(self, chart: Chart, order: Order, wait: OrderWait) -> None:
         """Wait before the next word of a command. Raises NotFollowed, and the line's errors."""
+        wanted = any_of([state.name for state in chart.states if state.id in wait.states])
+        if wait.seconds >= LONG_WAIT:
+            time = f"{wait.seconds:g} s"
+            goal = f"for {wanted}, at most {time}" if wait.states else time
+            self.session.work.report(OutcomeKind.WORKING, f"{order.name}: waiting {goal}")
         if not wait.states:
             await self.session.clock.sleep(wait.seconds)
             return
         state = await self.wait_for(chart, wait.states, wait.seconds)
         if state.id not in wait.states:
-            wanted = any_of([s.name for s in chart.states if s.id in wait.states])
             raise NotFollowed(
                 f"The drive did not reach {wanted} in {wait.seconds:g} s; it is in {state.name}."
             )

@@ -88,8 +88,12 @@ async def outcome_of(commander: Commander, give: Callable[[], None]) -> Outcome 
     before = work.outcome
     give()
     while True:
-        if work.outcome is not before or not work.busy_for(commander):
+        outcome = work.outcome if work.outcome is not before else None
+        if not work.busy_for(commander):
+            # the last look: it may have ended since
             return work.outcome if work.outcome is not before else None
+        if outcome is not None and outcome.kind is not OutcomeKind.WORKING:
+            return outcome
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
 
 
