@@ -45,6 +45,16 @@ WRONG: dict[str, Callable[[bytes], bytes]] = {
 }
 
 
+async def test_gateway_that_returns_no_transaction_id_is_reported(open_line: OpenLine) -> None:
+    def without_id(request: bytes, _count: int) -> Sequence[Step]:
+        return [bytes(2) + tcp_reply(request)[2:]]
+
+    with TcpPeer(without_id, length=tcp_request_length) as peer:
+        line = open_line(TcpLink("127.0.0.1", peer.port))
+        with pytest.raises(WrongReply, match="does not return the transaction id"):
+            await line.read(1, 5)
+
+
 @pytest.mark.parametrize("case", ["another function", "too few words", "too many words"])
 async def test_plain_client_accepts_a_wrong_reply(case: str) -> None:
     with TcpPeer(lambda request, _: [WRONG[case](request)], length=tcp_request_length) as peer:

@@ -13,6 +13,8 @@ from ..expectation import exception_code
 from ..master import ExchangeResult, LineContext, Piece, ResultKind, Sending, settle
 from ..transport.base import Transport
 
+NO_TRANSACTION = bytes(2)
+ID_MISSING = "the gateway does not return the transaction id of the request. Use another gateway"
 HEADER_LENGTH = 7
 """Transaction id, protocol id, length, unit id."""
 SHOWN = 260
@@ -44,6 +46,8 @@ class TcpMaster:
         self._transaction = 0
         self._sending: Sending | None = None
         self._done: asyncio.Future[ExchangeResult] | None = None
+        self._unnumbered = False
+        """True if a reply without a transaction id came since the last request."""
         self._hold = 0.0
         self._last = 0.0
         transport.start(self)
@@ -73,6 +77,7 @@ class TcpMaster:
     def _take(self, unit: bytes, time: float) -> None:
         sending = self._sending
         if sending is None or sending.expectation is None or not self._is_ours(unit):
+            self._unnumbered |= unit[:2] == NO_TRANSACTION  # no request has this id
             self._around.tally.stale += 1
             self._around.trace.add(time, "in", unit, "late or repeated")
             return
@@ -114,7 +119,7 @@ class TcpMaster:
         if self.failure is not None:
             raise self.failure
         self._done = asyncio.get_running_loop().create_future()
-        self._sending = sending
+        self._sending, self._unnumbered = sending, False
         begun = clock()
         try:
             sending.look()
@@ -151,7 +156,11 @@ class TcpMaster:
         await asyncio.wait((self._done,), timeout=sending.time_out)
         if self.failure is not None:
             raise self.failure
-        return self._done.result() if self._done.done() else ExchangeResult(ResultKind.NOTHING)
+        if self._done.done():
+            return self._done.result()
+        if self._unnumbered:
+            return ExchangeResult(ResultKind.WRONG, detail=ID_MISSING)
+        return ExchangeResult(ResultKind.NOTHING)
 
 
 def _result(unit: bytes, sending: Sending, awaited: int) -> ExchangeResult:
