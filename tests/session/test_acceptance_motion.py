@@ -9,6 +9,7 @@ from typing import Any, cast
 
 import pytest
 
+from tui.bus.errors import NoAnswer
 from tui.bus.line_events import ControlRequested, DevicesStopped, ProgramsChanged
 from tui.drive.profile import library
 from tui.session.acceptance import motion
@@ -51,6 +52,7 @@ class Rig:
         self.error_at_rest: Exception | None = None
         self.ending: Ending | None = None
         self.arming: list[str] = []
+        self.progress: list[str] = []
         self.latest = SimpleNamespace(
             time=1e9, error="", readings={}, state=SimpleNamespace(kind="ready", local=False)
         )
@@ -83,7 +85,7 @@ class Rig:
         monkeypatch.setattr(motion, "outcome_or_error", commanded)
         monkeypatch.setattr(motion, "latest_of", lambda _: self.latest)
         self.bench = MotionBench(
-            cast(Any, None), cast(Any, self.console), Ending(), lambda _: None, lambda _: None
+            cast(Any, None), cast(Any, self.console), Ending(), self.progress.append, lambda _: None
         )
 
     def _arm(self, stamp: int, seconds: float) -> None:
@@ -250,7 +252,17 @@ def test_line_is_lost_after_two_failed_cycles(monkeypatch: pytest.MonkeyPatch) -
     assert shown(rig, error="no answer") == ""
     assert shown(rig, error="") == ""
     assert shown(rig, error="no answer") == ""
-    assert shown(rig, error="no answer") == "the line was lost: no answer"
+    text = NoAnswer(1, 3, 3201, "no answer", retry_in=0.9)
+    assert shown(rig, error=str(text)) == "the line was lost: no answer"  # a result does not retry
+
+
+def test_standstill_is_reported_if_the_test_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig(monkeypatch)
+    rig.bench.report("stopped", "Device 4: stopped.")
+    assert rig.progress == []
+    rig.bench.whole.end("the line was lost")  # after NOT STOPPED yet, for example
+    rig.bench.report("stopped", "Device 4: stopped.")
+    assert rig.progress == ["Device 4: stopped."]
 
 
 def test_failed_cycles_while_polling_is_paused_end_nothing(

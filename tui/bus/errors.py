@@ -18,6 +18,14 @@ def strip_outcome_note(error: LineError) -> str:
     return str(error).removesuffix(OUTCOME_UNKNOWN)
 
 
+RETRYING = " Retrying in "
+
+
+def strip_retry_note(text: str) -> str:
+    """Return the text of an error for a record: without the time of the next try."""
+    return text.partition(RETRYING)[0]
+
+
 class LinkSyntaxError(LineError):
     """A typed link cannot be understood; the text shows the forms that can."""
 
@@ -159,7 +167,7 @@ class NoAnswer(ExchangeError):
         self.detail = detail
         text = detail or f"Device {device} did not answer ({request_text(function, address)})."
         if retry_in is not None:
-            text = f"{text} Retrying in {retry_in:.1f} s."
+            text = f"{text}{RETRYING}{retry_in:.1f} s."
         super().__init__(device, function, address, text)
 
 

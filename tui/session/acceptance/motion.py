@@ -12,6 +12,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from tui.bus.errors import strip_retry_note
 from tui.bus.line_events import ControlRequested, DevicesStopped, LineEvent
 from tui.drive.chart import Direction
 from tui.drive.errors import DriveError
@@ -309,10 +310,12 @@ class MotionBench:
     # Reports of a run
 
     def report(self, event: RunEvent, text: str) -> None:
-        """Note the stop, for the curve and its times."""
+        """Note the stop, for the curve and its times; at an early end, report the standstill."""
         if event == "stopping" and not self.stopped_at:
             self.stopped_at = self.console.session.clock.monotonic()
             self.curve.marks.append((self.stopped_at, "stop"))
+        if event == "stopped" and self.whole.event.is_set():
+            self.say(text)
 
     def show(self, latest: Snapshot, timeout_text: Callable[[], str]) -> None:
         """End the test if the line is lost, or another source commands the drive."""
@@ -321,7 +324,7 @@ class MotionBench:
         if latest.error:
             self._failed_cycles += 1
             if self._failed_cycles >= FAILED_CYCLES:
-                self.whole.end(f"the line was lost: {latest.error}")
+                self.whole.end(f"the line was lost: {strip_retry_note(latest.error)}")
             return
         self._failed_cycles = 0
         if self._own_stop:
