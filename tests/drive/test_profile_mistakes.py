@@ -432,7 +432,7 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "ms",
         'code = 3\nname = "Read"\nmax_read = 8',
         'code = 3\nname = "Read"\nmax_read = 1',
-        "uint32 is two words, but function 3 reads one",
+        "uint32 is 2 words, but function 3 reads 1",
         'type = "uint32"',
     ),
 }

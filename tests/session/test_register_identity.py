@@ -103,6 +103,16 @@ async def test_two_registers_must_both_fit() -> None:
     assert (await identify_drive(FakeLine({1: WORDS}), 1)).profile is None
 
 
+async def test_register_of_32_bits_is_read_word_by_word() -> None:
+    wide = ROW.format("WIDE", 3400) + 'type = "uint32"\n'
+    text = 'registers = [{ parameter = "WIDE", values = [70000] }]'
+    installed_mixer('unit = "Hz"\nscale = "0.1"', wide, identified_by(text))
+    line = FakeLine({1: {100: 1, 3400: 70000 & 0xFFFF, 3401: 1}})
+    assert (await identify_drive(line, 1)).profile == MIXER
+    line.devices[1].words[3401] = 2
+    assert (await identify_drive(line, 1)).profile is None
+
+
 async def test_damaged_register_leaves_the_drive_unknown() -> None:
     installed()
     line = FakeLine({1: WORDS})
@@ -180,6 +190,7 @@ def test_simulated_drive_has_the_register_and_the_text() -> None:
     ]
 
 
+@pytest.mark.sweep
 def test_scan_recognizes_two_drives_of_different_makes(packaged: None) -> None:
     installed()
     line = f"sim:{MIXER}@1,atv312@2,powerdrive@3"
@@ -190,7 +201,8 @@ def test_scan_recognizes_two_drives_of_different_makes(packaged: None) -> None:
 
 
 def checked(*changes: tuple[str, str], name: str = "mixer.toml") -> Result:
-    text = mixer_text() + ROWS
+    row = ROW.format("IN", TYPE + 2) + "function = 4\n"
+    text = mixer_text() + ROWS + (row if "IN" in str(changes) else "")
     for before, after in changes:
         assert before in text, before
         text = text.replace(before, after)
@@ -203,13 +215,18 @@ def checked(*changes: tuple[str, str], name: str = "mixer.toml") -> Result:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('registers = [{ parameter = "TYPE", values = [] }]', "must"),
+        ('registers = [{ parameter = "TYPE", values = [] }]', "it needs values, or"),
         ('registers = [{ parameter = "NONE", values = [3100] }]', "there is no parameter 'NONE'"),
         ('registers = [{ parameter = "TYPE", values = [0] }]', "0 is also the value of"),
         ('registers = [{ parameter = "TYPE", values = [65535] }]', "65535 is also the value"),
         ('registers = [{ parameter = "TYPE", values = [70000] }]', "70000 does not fit uint16"),
         ('registers = [{ parameter = "TYPE", values = [7] }]', "Add a second register"),
         ('registers = [{ parameter = "KEY", values = [700] }]', "its access must be r"),
+        ('registers = [{ parameter = "IN", values = [700] }]', "only read by function 3"),
+        (
+            'registers = [{ parameter = "TYPE", begins = ["ABC"] }]',
+            "it needs values, or for a text",
+        ),
         ('reference_prefixes = ["MI"]', "too short"),
         ('reference_prefixes = ["ATV312"]', "the profile atv312 has the prefix 'ATV312' too"),
     ],

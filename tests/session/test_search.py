@@ -70,10 +70,8 @@ class Replies:
         _count: int,
         *,
         priority: Priority,
-        function: int = 3,
         within: float | None = None,
     ) -> None:
-        assert function == 3
         self.requested.append((device, priority))
         if device in self.errors:
             raise self.errors[device]

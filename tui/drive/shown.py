@@ -112,10 +112,13 @@ def number_of(
     raws: Mapping[str, int],
     absent: Collection[str] = (),
 ) -> Decimal | None:
-    """Return the engineering value of a raw value, even if named; None if the scale is unknown."""
+    """Return the engineering value of a raw value, even if named; None if the scale is unknown.
+
+    A text has none.
+    """
     if (taught := profile.taught.get(parameter.code)) is not None:
         return taught.number(raw)
-    scale = profile.scale(parameter, raws, absent)
+    scale = None if parameter.type == "ascii" else profile.scale(parameter, raws, absent)
     if scale is None or (raw == NOT_A_NUMBER and parameter.type == "float32"):
         return None
     return engineering(raw, scale, parameter.offset)

@@ -16,6 +16,7 @@ from .profile.schema import Bit, Parameter
 from .units import factor_between
 from .words import (
     NOT_A_NUMBER,
+    characters_of,
     from_words,
     hexadecimal,
     is_field,
@@ -28,6 +29,8 @@ from .words import (
 LONGEST_NUMBER = 30
 """Most digits before or after the decimal point of a typed number."""
 NOT_AVAILABLE = "-----"
+EMPTY_TEXT = "(empty)"
+"""Text of registers without characters."""
 HALF_A_STEP = Decimal("0.5")
 SPARE_DECIMALS = 1
 """Decimals that a scale may have beyond those that its counts need, and keeps: 0.25, 1.5."""
@@ -118,6 +121,8 @@ def decode(
     The result is its name if it has one, hexadecimal for bit words, else the number with the
     decimals of its scale. Without a scale, it is the raw value itself with unit `raw`.
     """
+    if parameter.type == "ascii":
+        return Value(raw, None, "", characters_of(parameter, raw) or EMPTY_TEXT)
     if parameter.bits:
         return Value(raw, None, "", hexadecimal(parameter, raw))
     if raw == NOT_A_NUMBER and parameter.type == "float32":

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Decimal
 
 from .errors import ValueRefused
+from .plain import plain
 from .profile.schema import Parameter
 
 NOT_A_NUMBER = -(1 << 31)
@@ -16,7 +17,7 @@ NOT_A_NUMBER = -(1 << 31)
 
 def is_signed_type(parameter: Parameter) -> bool:
     """Return True if the parameter's type has negative values."""
-    return not parameter.type.startswith("uint")
+    return not parameter.type.startswith(("uint", "ascii"))
 
 
 def _float_counts(parameter: Parameter, raw: int) -> int:
@@ -35,12 +36,19 @@ def _float_bits(parameter: Parameter, raw: int) -> int:
 
 
 def word_count(parameter: Parameter) -> int:
-    """Return the number of registers of the parameter: 1 or 2."""
+    """Return the number of registers of the parameter: 1 or 2, up to 32 for a text."""
+    if parameter.type == "ascii":
+        return parameter.words
     return 2 if parameter.type.endswith("32") else 1
 
 
 def from_words(parameter: Parameter, words: Sequence[int]) -> int:
-    """Return the raw value in the parameter's registers, by its sign, word order and bits."""
+    """Return the raw value in the parameter's registers, by its sign, word order and bits.
+
+    Of a text, it is the bytes of the registers as one number.
+    """
+    if parameter.type == "ascii":
+        return int.from_bytes(struct.pack(f">{len(words)}H", *words), "big")
     if word_count(parameter) == 2:
         low, high = words if parameter.low_word_first else reversed(words)
         raw, width = (high << 16) | low, 32
@@ -51,6 +59,27 @@ def from_words(parameter: Parameter, words: Sequence[int]) -> int:
     if parameter.type.startswith("int") and raw >= 1 << (width - 1):
         raw -= 1 << width
     return raw
+
+
+def characters_of(parameter: Parameter, raw: int) -> str:
+    """Return the text in the registers of a parameter up to its first null, without spaces after
+    it; a byte that is not ASCII becomes `\ufffd`."""
+    data = raw.to_bytes(2 * parameter.words, "big")
+    if parameter.low_byte_first:
+        data = _swapped(data)
+    return plain(data.partition(b"\0")[0].decode("ascii", "replace").rstrip())
+
+
+def _swapped(data: bytes) -> bytes:
+    return b"".join(bytes((low, high)) for high, low in zip(data[::2], data[1::2], strict=True))
+
+
+def raw_of_characters(parameter: Parameter, text: str) -> int:
+    """Return the raw value of a text, cut to the parameter's registers and filled with nulls."""
+    data = text.encode("ascii", "replace")[: 2 * parameter.words].ljust(2 * parameter.words, b"\0")
+    if parameter.low_byte_first:
+        data = _swapped(data)
+    return int.from_bytes(data, "big")
 
 
 def is_field(parameter: Parameter) -> bool:
@@ -67,6 +96,8 @@ def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[i
     low, high = type_range(parameter)
     if not low <= raw <= high:
         raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
+    if parameter.type == "ascii":
+        return struct.unpack(f">{parameter.words}H", raw.to_bytes(2 * parameter.words, "big"))
     if word_count(parameter) == 1:
         own = parameter.mask << parameter.shift
         if held is None:
@@ -106,7 +137,7 @@ def registers_of_word(parameter: Parameter, word: int) -> tuple[int, ...]:
 
 def type_range(parameter: Parameter) -> tuple[int, int]:
     """Return the lowest and highest raw value that the parameter's type can hold."""
-    width = 32 if parameter.type.endswith("32") else 16
+    width = 16 * word_count(parameter)
     if is_field(parameter):
         return 0, parameter.mask
     if parameter.type == "float32":

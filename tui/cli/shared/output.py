@@ -84,7 +84,7 @@ def drive_fields(line: str, session: DriveSession) -> DriveFields:
 
 
 def value_field(reading: Reading) -> ValueField:
-    """One value; `raw` and `value` are null where there is none.
+    """One value; `raw` and `value` are null where there is none, as for a text.
 
     The value of a name or a bit word is its raw number. `unsure` is set if no document explains
     so high a raw value.
@@ -93,10 +93,11 @@ def value_field(reading: Reading) -> ValueField:
 
     from ..documents.parts import ValueField
 
+    is_text = reading.parameter.type == "ascii"
     return ValueField(
         address=reading.parameter.address,
-        raw=reading.raw,
-        value=_number(reading),
+        raw=None if is_text else reading.raw,
+        value=None if is_text else _number(reading),
         unit=reading.unit,
         text=reading.text,
         taught=reading.value.taught if reading.value else False,

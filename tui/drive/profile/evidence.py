@@ -55,11 +55,13 @@ def evidence_text(evidence: ProfileEvidence) -> str:
 
 def statement_of(parameter: Parameter, names: Iterable[tuple[int, str]]) -> str:
     """Return everything in the profile that the displayed value of a parameter depends on."""
-    facts = (
+    facts: tuple[object, ...] = (
         parameter.function, parameter.address, parameter.type, parameter.low_word_first,
         parameter.mask, parameter.shift, parameter.unit, parameter.scale, parameter.scale_by,
         parameter.unit_by, parameter.full_scale, parameter.base, parameter.rating, sorted(names),
     )  # fmt: skip
+    if parameter.type == "ascii":
+        facts = (*facts, parameter.words, parameter.low_byte_first)
     return msgspec.json.encode(facts).decode()
 
 

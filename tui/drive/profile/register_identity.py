@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from tui.drive.values import is_enumeration, raw_range
+from tui.drive.words import characters_of
 
 from ..errors import ProfileError
 from . import library
 from .profile import Profile
-from .schema import Parameter
+from .schema import IdentityRegister, Parameter
 from .shared_rows import read_tables
 from .toml_lines import TomlPath
 
@@ -21,8 +22,8 @@ class RegisterIdentity(NamedTuple):
 
     profile: str
     prefixes: tuple[str, ...]
-    rows: tuple[tuple[Parameter, frozenset[int]], ...]
-    """Parameters and their raw values; all must fit."""
+    rows: tuple[tuple[Parameter, IdentityRegister], ...]
+    """Parameters and what they contain; all must fit."""
     others: Mapping[int, tuple[str, ...]]
     """Profiles whose drives may contain these values too, by the address of their status word.
     Drives of this family do not have it."""
@@ -61,9 +62,20 @@ def _known_profiles() -> list[Profile]:
     return found
 
 
-def _rows(profile: Profile) -> tuple[tuple[Parameter, frozenset[int]], ...]:
+def _rows(profile: Profile) -> tuple[tuple[Parameter, IdentityRegister], ...]:
     rows = profile.data.identification.registers
-    return tuple((profile[row.parameter], frozenset(row.values)) for row in rows)
+    return tuple((profile[row.parameter], row) for row in rows)
+
+
+def row_fits(parameter: Parameter, row: IdentityRegister, raw: int | None) -> bool:
+    """Return True if a register contains what identifies the family."""
+    if raw is None or not row.begins:
+        return raw in row.values
+    return _begins(characters_of(parameter, raw), row.begins)
+
+
+def _begins(text: str, beginnings: Sequence[str]) -> bool:
+    return text.upper().startswith(tuple(beginning.upper() for beginning in beginnings))
 
 
 def alike(profile: Profile, known: list[Profile]) -> list[Profile]:
@@ -78,23 +90,27 @@ def alike(profile: Profile, known: list[Profile]) -> list[Profile]:
         if rows
         and other.id != profile.id
         and not other.data.identification.reference_prefixes
-        and all(_may_contain(other, parameter, values) for parameter, values in rows)
+        and all(_may_contain(other, parameter, row) for parameter, row in rows)
     ]
 
 
-def _may_contain(other: Profile, parameter: Parameter, values: frozenset[int]) -> bool:
+def _may_contain(other: Profile, parameter: Parameter, row: IdentityRegister) -> bool:
     """Return True if a drive of another family may have one of these values at that address."""
     held = other.at(parameter.address, parameter.function)
     if held is None:
         reading = other.data.reading
-        return reading.gaps_readable and reading.unknown_word in values
-    for row, own in _rows(other):
-        if row.code == held.code:
-            return bool(own & values)
+        return reading.gaps_readable and reading.unknown_word in row.values
+    for own, own_row in _rows(other):
+        if own.code == held.code:
+            texts = any(_begins(text, row.begins) for text in own_row.begins)
+            texts = texts or any(_begins(text, own_row.begins) for text in row.begins)
+            return texts or bool(set(own_row.values) & set(row.values))
+    if row.begins:
+        return held.type == "ascii"
     if is_enumeration(held):
-        return bool(values & set(other.names(held)))
+        return bool(set(row.values) & set(other.names(held)))
     low, high = raw_range(held)
-    return any(low <= raw <= high for raw in values)
+    return any(low <= raw <= high for raw in row.values)
 
 
 def _telling_word(profile: Profile, other: Profile) -> int | None:

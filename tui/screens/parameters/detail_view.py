@@ -148,7 +148,7 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
     parts = [part for part in (number, hexadecimal, str(parameter.address)) if part]
     if parameter.eeprom_address is not None:
         parts.append(f"EEPROM 16#{parameter.eeprom_address:04X}")
-    if raw is not None:
+    if raw is not None and parameter.type != "ascii":
         staged = f" → {edit.new}" if edit is not None else ""
         word = f" = 16#{_word(edit.new if edit is not None else raw)}" if width >= 80 else ""
         parts.append(f"raw {raw}{staged}{word}")

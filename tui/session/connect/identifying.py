@@ -55,10 +55,9 @@ class Askable(Protocol):
         count: int = 1,
         *,
         priority: Priority,
-        function: int = 3,
         within: float | None = None,
     ) -> Reply:
-        """Read holding registers by function 3, or input registers by 4."""
+        """Read holding registers by function 3."""
         ...
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
 
 from tui.bus.api import Priority
 from tui.bus.errors import ChecksumFault, DeviceException, NoAnswer, RequestRefused, WrongReply
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.register_identity import RegisterIdentity, register_identities
+from tui.drive.profile.register_identity import RegisterIdentity, register_identities, row_fits
 from tui.drive.profile.schema import Parameter
-from tui.drive.words import from_words, word_count
+from tui.drive.words import characters_of, from_words, word_count
 
 from .identifying import Askable
 
@@ -19,38 +18,43 @@ REGISTER_TRIES = 2
 
 
 class RegisterReads:
-    """Reads of one device; each register is read once."""
+    """Reads of one device by function 3, word by word; each word is read once.
+
+    More is not sent to a device whose family is not known.
+    """
 
     def __init__(
         self, line: Askable, device: int, priority: Priority, within: float | None
     ) -> None:
         self._line, self._device = line, device
         self._priority, self._within = priority, within
-        self._read: dict[tuple[int, int, int], Sequence[int] | None] = {}
+        self._read: dict[int, int | None] = {}
 
     async def raw(self, parameter: Parameter) -> int | None:
         """Return the raw value of a parameter; None if the drive does not have it.
 
         Raises ChecksumFault or WrongReply if no reply was intact.
         """
-        words = await self.words(parameter.function, parameter.address, word_count(parameter))
-        return None if words is None else from_words(parameter, words)
+        words = []
+        for place in range(word_count(parameter)):
+            if (word := await self.word(parameter.address + place)) is None:
+                return None
+            words.append(word)
+        return from_words(parameter, words)
 
-    async def words(self, function: int, address: int, count: int) -> Sequence[int] | None:
-        """Return registers; None without an answer. Raises ChecksumFault, WrongReply."""
-        place = function, address, count
-        if place not in self._read:
-            self._read[place] = await self._ask(*place)
-        return self._read[place]
+    async def word(self, address: int) -> int | None:
+        """Return a register; None without an answer. Raises ChecksumFault, WrongReply."""
+        if address not in self._read:
+            self._read[address] = await self._ask(address)
+        return self._read[address]
 
-    async def _ask(self, function: int, address: int, count: int) -> Sequence[int] | None:
+    async def _ask(self, address: int) -> int | None:
         unclear: ChecksumFault | WrongReply | None = None
         for _ in range(REGISTER_TRIES):
             try:
                 reply = await self._line.read(
-                    self._device, address, count,
-                    priority=self._priority, function=function, within=self._within,
-                )  # fmt: skip
+                    self._device, address, 1, priority=self._priority, within=self._within
+                )
             except (DeviceException, RequestRefused):
                 return None
             except NoAnswer:
@@ -58,7 +62,7 @@ class RegisterReads:
             except (ChecksumFault, WrongReply) as error:
                 unclear = error
             else:
-                return reply.words
+                return reply.words[0]
         if unclear is not None:
             raise unclear
         return None
@@ -76,14 +80,14 @@ async def families_by_registers(reads: RegisterReads, reference: str) -> tuple[s
         if not other and await _fits(reads, family):
             found.append(family.profile)
             for address, ids in family.others.items():
-                if await reads.words(3, address, 1) is not None:
+                if await reads.word(address) is not None:
                     found += ids
     return tuple(dict.fromkeys(found))
 
 
 async def _fits(reads: RegisterReads, family: RegisterIdentity) -> bool:
-    for parameter, values in family.rows:
-        if await reads.raw(parameter) not in values:
+    for parameter, row in family.rows:
+        if not row_fits(parameter, row, await reads.raw(parameter)):
             return False
     return True
 
@@ -96,6 +100,7 @@ async def unexpected_register(reads: RegisterReads, profile: Profile) -> str:
     for row in profile.data.identification.registers:
         parameter = profile[row.parameter]
         raw = await reads.raw(parameter)
-        if raw is not None and raw not in row.values:
-            return f"{parameter.code} ({parameter.number}) {raw}"
+        if raw is not None and not row_fits(parameter, row, raw):
+            value = characters_of(parameter, raw) if row.begins else raw
+            return f"{parameter.code} ({parameter.number}) {value!r}"
     return ""

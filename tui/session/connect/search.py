@@ -268,14 +268,11 @@ class _Considerate:
         count: int = 1,
         *,
         priority: Priority,
-        function: int = 3,
         within: float | None = None,
     ) -> Reply:
         """As the line's own."""
         try:
-            return await self._line.read(
-                device, address, count, priority=priority, function=function, within=within
-            )
+            return await self._line.read(device, address, count, priority=priority, within=within)
         except NoAnswer:
             await self._rest(priority, within)
             raise

@@ -13,6 +13,7 @@ from typing import Literal
 from tui.bus.link import Link
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
+from tui.drive.words import word_count
 from tui.wire.observed.pairing import ObservedExchange
 
 from ..connect.identify import DriveIdentity, identity_from
@@ -159,7 +160,7 @@ def _words(profile: Profile) -> set[tuple[int, int]]:
     found: set[tuple[int, int]] = {
         (parameter.function, parameter.address) for parameter in profile.parameters
     }
-    found |= {(p.function, p.address + 1) for p in profile.parameters if p.type.endswith("32")}
+    found |= {(p.function, p.address + n) for p in profile.parameters for n in range(word_count(p))}
     for block in profile.data.blocks:
         found |= {(3, block.address + n) for n in range(block.max_words)}
     return found

@@ -71,6 +71,7 @@ def parameter_events(session: DriveSession, codes: Sequence[str]) -> list[EventR
             "function": parameter.function, "type": parameter.type, "unit": parameter.unit,
             "scale": parameter.scale, "offset": parameter.offset,
             "low_word_first": parameter.low_word_first,
+            "words": parameter.words, "low_byte_first": parameter.low_byte_first,
         }  # fmt: skip
         events.append(EventRow(*now, session.device, "parameter", json.dumps(form)))
     return events

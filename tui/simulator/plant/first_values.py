@@ -10,6 +10,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Model, Parameter, Quantity
 from tui.drive.settings.limits import counts_of
 from tui.drive.values import is_enumeration, raw_range, type_range
+from tui.drive.words import raw_of_characters
 
 from .motor import RatingPlate, rating_of
 
@@ -56,7 +57,8 @@ def first_values(
     """
     chosen = {code.casefold(): raw for code, raw in line_first.items()}
     for row in profile.data.identification.registers:
-        chosen.setdefault(row.parameter.casefold(), row.values[0])
+        text = raw_of_characters(profile[row.parameter], row.begins[0]) if row.begins else 0
+        chosen.setdefault(row.parameter.casefold(), text or row.values[0])
     plate = _plate(rating)
     values: dict[str, int] = {}
     for parameter in profile.parameters:
@@ -65,6 +67,8 @@ def first_values(
             raw = parameter.factory
         if raw is None and parameter.quantity in plate:
             raw = to_raw(profile, parameter, plate[parameter.quantity])
+        if raw is None and parameter.type == "ascii":
+            raw = raw_of_characters(parameter, parameter.code)
         values[parameter.code] = _lowest(profile, parameter) if raw is None else raw
     for parameter in profile.parameters:
         full = parameter.full_scale

@@ -12,6 +12,7 @@ from tui.drive.orders import STOP_ORDERS, optional_bits
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.profile_frame import READING, frame_contents
 from tui.drive.profile.reference_ways import reference_ways
+from tui.drive.profile.register_identity import row_fits
 from tui.drive.profile.rules.charts import RUN_ORDERS
 from tui.drive.profile.schema import (
     Chart,
@@ -249,8 +250,9 @@ def _identity(profile: Profile) -> Iterator[ProofStep]:
 
 
 def _identifies(profile: Profile, row: IdentityRegister) -> None:
-    raw = ProofBench(profile, None).read(profile[row.parameter])
-    if raw not in row.values:
+    parameter = profile[row.parameter]
+    raw = ProofBench(profile, None).read(parameter)
+    if not row_fits(parameter, row, raw):
         raise Unproved(f"{row.parameter} is {raw}")
 
 

@@ -28,7 +28,8 @@ def identity_registers(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if parameter.access != "r":
             yield at, f"register {row.parameter}: it can be written. Its access must be r."
         yield from ((at, f"register {row.parameter}: {text}") for text in _bad(row, parameter))
-    if len(rows) == 1 and rows[0].parameter in known and min(rows[0].values) < COMMON_BELOW:
+    common = len(rows) == 1 and rows[0].parameter in known and rows[0].values
+    if common and min(rows[0].values) < COMMON_BELOW:
         yield (
             ("identification", "registers"),
             f"identification: values below {COMMON_BELOW} are common. Add a second register.",
@@ -37,6 +38,13 @@ def identity_registers(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def _bad(row: IdentityRegister, parameter: Parameter) -> Iterator[str]:
     low, high = type_range(parameter)
+    if bool(row.values) is bool(row.begins) or bool(row.begins) is not (parameter.type == "ascii"):
+        yield "it needs values, or for a text (ascii) begins."
+        return
+    if parameter.function != 3:
+        yield "an unknown drive is only read by function 3."
+    if any(len(text.strip()) < SHORTEST_TEXT for text in row.begins):
+        yield f"a beginning is too short: {SHORTEST_TEXT} characters at least."
     if parameter.type == "float32":
         yield "a float32 has no exact value."
         return

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from tui.drive.values import raw_range
+from tui.drive.values import raw_range, word_count
 
 from ..profile_frame import FrameError, frame_contents
 from ..reference_ways import QUANTITY_OF_KIND, reference_ways
@@ -256,14 +256,15 @@ def writable_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def readable_pairs(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Yield parameters of two words of which a read holds only one."""
+    """Yield parameters of several words of which a read holds fewer."""
     most = {function.code: function.max_read for function in data.functions}
     for index, parameter in enumerate(data.parameters):
-        if parameter.type.endswith("32") and most.get(parameter.function) == 1:
+        words, limit = word_count(parameter), most.get(parameter.function)
+        if words > (limit or words) or (words > 2 and data.reading.single_words_only):
             yield (
                 ("parameters", index, "type"),
-                f"parameter {parameter.code}: {parameter.type} is two words, but function"
-                f" {parameter.function} reads one (max_read).",
+                f"parameter {parameter.code}: {parameter.type} is {words} words, but function"
+                f" {parameter.function} reads {limit or 1} (max_read).",
             )
 
 

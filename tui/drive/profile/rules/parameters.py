@@ -6,11 +6,14 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from tui.drive.values import raw_range, type_range
+import msgspec
+
+from tui.drive.values import raw_range, type_range, word_count
 
 from ..help_file import help_findings
 from ..schema import HelpData, Parameter, ProfileData
 from ..toml_lines import TomlPath
+from .names import named_parameters
 
 
 def unique_names(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
@@ -190,7 +193,9 @@ def _range_faults(
 
 
 def _shape_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
-    long = parameter.type.endswith("32")
+    long = word_count(parameter) > 1
+    if parameter.type == "ascii" or parameter.words > 1 or parameter.low_byte_first:
+        yield from _text_faults(parameter)
     if parameter.mask != 0xFFFF or parameter.shift:
         if long or parameter.type != "uint16":
             yield "type", f"a field of a register (mask, shift) is uint16, not {parameter.type}."
@@ -204,7 +209,7 @@ def _shape_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
             "a float32 has a resolution as its scale, such as 0.01, and neither bits, names,"
             " scale_by nor full_scale.",
         )
-    width = 32 if long else 16
+    width = 16 * word_count(parameter)
     for key, bits in (("bits", [b.bit for b in parameter.bits]), ("reserved", parameter.reserved)):
         if bits and max(bits) >= width:
             yield key, f"there is no bit {max(bits)} in {parameter.type}: 0 to {width - 1}."
@@ -212,8 +217,37 @@ def _shape_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
         yield from _offset_faults(parameter)
     if parameter.function == 4 and parameter.access != "r":
         yield "function", "an input register (function 4) can only be read: access must be r."
-    if parameter.address + (2 if long else 1) > 0x10000:
+    if parameter.address + word_count(parameter) > 0x10000:
         yield "address", "exceeds address 65535."
+
+
+FIELDS_OF_TEXTS = frozenset({
+    "code", "name", "number", "address", "function", "type", "words", "low_byte_first",
+    "low_word_first", "access", "group", "note", "source", "confidence", "storage",
+})  # fmt: skip
+"""Fields that a text may have."""
+
+
+def _text_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
+    """Yield what a text cannot have, and what only a text has."""
+    if parameter.type != "ascii":
+        yield "type", f"words and low_byte_first are for a text (ascii), not for {parameter.type}."
+        return
+    if parameter.access != "r":
+        yield "access", "a text (ascii) is only read: access must be r."
+    for item in msgspec.structs.fields(parameter):
+        if item.name not in FIELDS_OF_TEXTS and getattr(parameter, item.name) != item.default:
+            default = item.default_factory() if callable(item.default_factory) else None
+            if getattr(parameter, item.name) != default:
+                yield item.name, f"a text (ascii) has no {item.name}."
+
+
+def texts_are_read(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield places that need a number, and name a text."""
+    texts = {parameter.code for parameter in data.parameters if parameter.type == "ascii"}
+    for place, code in named_parameters(data) if texts else ():
+        if code in texts and place[:2] != ("identification", "registers"):
+            yield place, f"{place[0]}: {code} is a text, not a number."
 
 
 def _has_float_faults(parameter: Parameter) -> bool:
@@ -268,4 +302,4 @@ def no_site(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             )
 
 
-PARAMETER_RULES = (unique_names, fields, enumeration_keys, fault_help, no_site)
+PARAMETER_RULES = (unique_names, fields, texts_are_read, enumeration_keys, fault_help, no_site)

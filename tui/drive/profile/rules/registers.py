@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from tui.drive.words import word_count
+
 from ..schema import Parameter, ProfileData
 from ..toml_lines import TomlPath
 
@@ -15,8 +17,7 @@ def overlaps(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield parameters that share bits of a register."""
     held: dict[tuple[int, int], list[Parameter]] = {}
     for index, parameter in enumerate(data.parameters):
-        long = parameter.type.endswith("32")
-        for address in range(parameter.address, parameter.address + (2 if long else 1)):
+        for address in range(parameter.address, parameter.address + word_count(parameter)):
             others = held.setdefault((parameter.function, address), [])
             for other in others:
                 if fault := _clash(parameter, other, address):
@@ -32,7 +33,7 @@ def eeprom_addresses(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         for parameter in data.parameters
         if parameter.function == 3
         for address in (parameter.address,)
-        for place in range(2 if parameter.type.endswith("32") else 1)
+        for place in range(word_count(parameter))
     }
     for index, parameter in enumerate(data.parameters):
         first = parameter.eeprom_address
@@ -52,7 +53,7 @@ def eeprom_addresses(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 f"parameter {parameter.code}: a family has [memory.save] or EEPROM addresses, not"
                 " both.",
             )
-        for address in range(first, first + (2 if parameter.type.endswith("32") else 1)):
+        for address in range(first, first + word_count(parameter)):
             if (other := held.get(address)) is not None:
                 yield (
                     at,
@@ -67,11 +68,11 @@ def eeprom_addresses(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
     """Return why two parameters cannot share an address; empty if they can."""
-    if parameter.type.endswith("32") or other.type.endswith("32"):
-        pair = parameter if parameter.type.endswith("32") else other
+    longer = parameter if word_count(parameter) > 1 else other
+    if word_count(longer) > 1 or "ascii" in (parameter.type, other.type):
         return (
-            f"address {address} also belongs to {other.code}: {pair.code} is {pair.type} and uses"
-            f" {pair.address} and {pair.address + 1}."
+            f"address {address} also belongs to {other.code}: {longer.code} is {longer.type} and"
+            f" uses {longer.address} to {longer.address + word_count(longer) - 1}."
         )
     bits, others = (p.mask << p.shift for p in (parameter, other))
     # a status word whose upper byte is the fault: each is read, neither is written

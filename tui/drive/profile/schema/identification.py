@@ -74,8 +74,10 @@ class IdentityRegister(Table, frozen=True, kw_only=True):
     """A parameter that shows the family of a drive."""
 
     parameter: str
-    values: Annotated[list[int], Meta(min_length=1)]
+    values: list[int] = []
     """Raw values that only drives of this family have."""
+    begins: list[str] = []
+    """Instead of values: beginnings of a text (`ascii`)."""
 
 
 class Identification(Table, frozen=True, kw_only=True):

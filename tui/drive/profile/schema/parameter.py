@@ -19,7 +19,7 @@ from .base import (
     WordAddress,
 )
 
-WordType = Literal["uint16", "int16", "uint32", "int32", "float32"]
+WordType = Literal["uint16", "int16", "uint32", "int32", "float32", "ascii"]
 Access = Literal["r", "rw", "rw-stopped", "w"]
 Storage = Literal["ram", "eeprom", "ram-until-saved", "unknown"]
 
@@ -223,6 +223,10 @@ class Parameter(Table, frozen=True, kw_only=True):
     function: Literal[3, 4] = 3
     """The function that reads it: 3, or 4 for an input register, which is never written."""
     type: WordType = "uint16"
+    words: Annotated[int, Meta(ge=1, le=32)] = 1
+    """Registers of a text (`ascii`), two characters each; a text is only read."""
+    low_byte_first: bool = False
+    """True if the first character of each register of a text is its low byte."""
     low_word_first: bool = True
     """Word order of a 32-bit value; absent: as in `reading`."""
     mask: Annotated[int, Meta(ge=1, le=0xFFFF)] = 0xFFFF
