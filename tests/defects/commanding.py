@@ -51,8 +51,8 @@ DEFECTS = (
     Defect(
         "write-believed-unread",
         "tui/session/settings",
-        "session.image.doubt(code)",
-        "session.image.confirm(code, raw, 1e12)",
+        "        self._doubt(parameter)\n",
+        "        session.image.confirm(code, raw, 1e12)\n",
         "A refused value counts as set, and the next stop word is chosen by it.",
         (WRITING,),
     ),
