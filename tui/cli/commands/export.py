@@ -18,7 +18,7 @@ from tui.drive.sentences import counted
 from ..documents.document import Document, DocumentPart
 from ..shared.completion import complete_line_or_code
 from ..shared.csv_files import CsvFile
-from ..shared.errors import USAGE, Failure
+from ..shared.errors import USAGE, Failure, file_failures
 from ..shared.line_argument import LineArgument
 from ..shared.options import devices_option, json_option
 from ..shared.output import print_json
@@ -172,18 +172,10 @@ def _export_frames(wish: ExportOptions, record: RecordEvents) -> None:
     if next(record.of("parameter"), None) is not None:
         text = "It has values only. Frames are in the record of a line."
         raise Failure(f"{wish.source} has no frames. {text}", USAGE)
-    try:
+    with file_failures(wish.path):
         file = CaptureFile(wish.path, record.line, raw=wish.raw, force=wish.force)
-    except FileExistsError as error:
-        text = f"{wish.path} already exists. Choose another name or use --force."
-        raise Failure(text, USAGE) from error
-    except OSError as error:
-        raise _unwritable(wish.path, error) from error
-    try:
         with closing(file):
             _write_frames(file, wish, record)
-    except OSError as error:
-        raise _unwritable(wish.path, error) from error
     wish.files.append(ExportFileField(file=str(wish.path), count=file.packets))
 
 
@@ -205,10 +197,6 @@ def _write_frames(file: CaptureFile, wish: ExportOptions, record: RecordEvents) 
                         file.add_frame(frame.device, frame.data, frame.wall, request=frame.request)
                     else:
                         file.add_seen(Frame(0.0, "in", frame.data), frame.wall, tcp=is_tcp)
-
-
-def _unwritable(path: Path, error: OSError) -> Failure:
-    return Failure(f"{path} cannot be written: {error.strerror or error}.", USAGE)
 
 
 # Values

@@ -21,7 +21,7 @@ from tui.session.signals import BY_SIGNAL, signal_name
 from tui.wire.observed.splitting import ObservedFrame
 
 from ..shared.completion import complete_line, complete_profile
-from ..shared.errors import INTERRUPTED, LINE_TROUBLE, USAGE, Failure
+from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, file_failures
 from ..shared.line_argument import LineArgument
 from ..shared.listen_outputs import ListenOutput
 from ..shared.numbers import seconds
@@ -177,16 +177,9 @@ def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> Cap
 
     if path is None:
         return None
-    try:
+    with file_failures(path):
         output = os.fdopen(os.dup(1), "wb", buffering=0) if path == STANDARD else None
         return CaptureFile(path, line, raw=raw, force=force, output=output)
-    except FileExistsError:
-        raise Failure(
-            f"{path} already exists. Choose another name or use --force.", USAGE
-        ) from None
-    except OSError as error:
-        text = f"{path} cannot be written: {error.strerror or error}."
-        raise Failure(text, USAGE) from error
 
 
 def _say_begin(port: str, raw_file: Path | None, *, err: bool) -> None:
@@ -252,11 +245,8 @@ class HearingRun:
         if self._file is None:
             return
         wall = frame.ended + self._wall
-        try:
+        with file_failures(self._file.path):
             if request is None:
                 self._file.add_noise(frame.data, wall)
             else:
                 self._file.add_frame(frame.device, frame.pdu, wall, request=request)
-        except OSError as error:
-            text = f"{self._file.path} cannot be written: {error.strerror or error}."
-            raise Failure(text, USAGE) from error

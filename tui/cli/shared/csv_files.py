@@ -17,7 +17,7 @@ import click
 
 from tui.drive.plain import plain_cells
 
-from .errors import USAGE, Failure
+from .errors import USAGE, Failure, file_failures
 from .standard_streams import STANDARD
 
 _SIZE = re.compile(r"(\d{1,9}(?:\.\d{1,9})?)\s*(k|M|G)i?B?", re.IGNORECASE)
@@ -69,7 +69,7 @@ class CsvFile:
         self._file = self._opened(append=append)
 
     def _opened(self, *, append: bool) -> TextIO:
-        try:
+        with file_failures(self.path):
             if not append or not self.path.exists() or not self.path.stat().st_size:
                 return self._begun()
             self._check_titles()
@@ -79,8 +79,6 @@ class CsvFile:
             if not whole:  # a row that a crash has cut
                 file.write("\r\n")
             return file
-        except OSError as error:
-            raise self._trouble(error) from error
 
     def _begun(self) -> TextIO:
         if self.path == STANDARD:
@@ -110,13 +108,11 @@ class CsvFile:
         text = io.StringIO(newline="")
         csv.writer(text).writerow(plain_cells(cells))
         row = text.getvalue()
-        try:
+        with file_failures(self.path):
             if self._due(len(row.encode())):
                 self._put_aside()
             self._file.write(row)
             self._file.flush()
-        except OSError as error:
-            raise self._trouble(error) from error
         self.rows += 1
 
     def _due(self, more: int) -> bool:
@@ -142,9 +138,6 @@ class CsvFile:
 
     def _named(self, part: str) -> Path:
         return self.path.with_name(f"{self.path.stem}-{part}{self.path.suffix}")
-
-    def _trouble(self, error: OSError) -> Failure:
-        return Failure(f"{self.path} cannot be written: {error.strerror or error}.", USAGE)
 
     def close(self) -> None:
         """Close the file; a full disk was reported at the time of writing."""

@@ -8,6 +8,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, ParamSpec, TypeVar
 
 import click
@@ -50,6 +51,18 @@ class Failure(click.ClickException):
     def show(self, file: object = None) -> None:
         """Print the message on standard error."""
         say(f"drivepanel: {self.message}", err=True)
+
+
+@contextmanager
+def file_failures(path: Path) -> Iterator[None]:
+    """Raise errors of writing this file as Failure with status 2."""
+    try:
+        yield
+    except FileExistsError as error:
+        text = f"{path} already exists. Choose another name or use --force."
+        raise Failure(text, USAGE) from error
+    except OSError as error:
+        raise Failure(f"{path} cannot be written: {error.strerror or error}.", USAGE) from error
 
 
 @contextmanager
