@@ -100,5 +100,12 @@ EQUIVALENT: dict[str, str] = {
     "tui/drive/values.py:engineering: constant: 1 -> 10": "Only the exponent of it counts.",
     "tui/drive/values.py:engineering: constant: 1 -> 2": "Only the exponent of it counts.",
     'tui/drive/values.py:engineering: text: "0" -> "" #2': "To add 0 changes nothing.",
+    "tui/session/read/reader.py:Reader._take: argument: codes.difference(image.refused, found) ->"
+    " codes.difference(found, image.refused)": ("Both are left out, in whichever order."),
+    "tui/session/work.py:WorkQueue.stop: call: object() -> None": (
+        "No worker has None as its identity."
+    ),
+    "tui/bus/stop_counts.py:StopCounts.note: argument: zip(devices, counts, strict=False) ->"
+    " zip(devices, counts)": ("It is the default."),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from decimal import Decimal
 from types import SimpleNamespace
 from typing import Any, cast
 from unittest.mock import Mock, call
@@ -16,6 +17,7 @@ from tui.bus.link import RtuTcpLink, TcpLink
 from tui.bus.notes import LineNote
 from tui.bus.poll_plan import USUAL_TURNAROUND
 from tui.drive.profile import library
+from tui.drive.values import Value
 from tui.session.carry_on import carried_on
 from tui.session.event_notes import (
     EVENTS_OF_LINE,
@@ -30,7 +32,7 @@ from tui.session.image import NEVER_READ, RegisterImage
 from tui.session.read import kept_plans
 from tui.session.read.kept_plans import PLANS_KEPT, TURNAROUND_STEP, KeptPlans
 from tui.session.read.presence import PresenceRead, alive_read, presence_read
-from tui.session.reading import Origin, Reading
+from tui.session.reading import Origin, Reading, reading_of, with_text
 
 ATV71 = library.load("atv71")
 
@@ -108,6 +110,18 @@ def test_written_word_is_unknown_until_it_is_read_after_that(
     held.confirm("ACC", 32, 12.0)
     held.confirm("ACC", 33, 13.0)
     assert heard == [32], "the first value, once"
+
+
+def test_reading_has_its_number_its_age_and_its_origin() -> None:
+    plain = Reading.undecoded(ATV71["ACC"], 30, 10.0, Origin.POLL)
+    three, named = Value(30, Decimal("3.0"), "s", "3.0"), Value(0, None, "", "off")
+    found = plain.decoded(three, named)
+    assert (found.number, found.current_number, found.physical) == (3.0, 3.0, named)
+    assert (found.origin, found.quality, found.time) == (Origin.POLL, plain.quality, 10.0)
+    assert [plain.number, plain.decoded(named, None).number] == [None, None]
+    assert [found.age(now) for now in (12.5, 10.0, 9.0)] == [2.5, 0.0, 0.0]
+    assert reading_of(found) is found
+    assert with_text({"ACC": found}) == {"ACC": found}
 
 
 # -- presence --------------------------------------------------------------------------------------

@@ -165,7 +165,7 @@ async def test_stop_by_another_program_ends_arming_and_work_and_is_reported(benc
     bench.facts.events.emit(DevicesStopped((1,), "the stop key", REMOTE))
     assert not bench.session.arming.armed
     assert bench.session.work.stops == before + 1
-    assert any("Stop from panel on pts/9 (pid 77)" in text for text in bench.reported)
+    assert "Stop from panel on pts/9 (pid 77) (the stop key)." in bench.reported
     bench.session.arming.arm()
     bench.facts.events.emit(DevicesStopped((2,), "the stop key", REMOTE))
     assert bench.session.arming.armed

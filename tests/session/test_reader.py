@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from decimal import Decimal
 from types import SimpleNamespace
 from typing import Any, cast
@@ -10,12 +11,16 @@ import pytest
 
 from tui.bus.api import Priority, Reply
 from tui.bus.errors import NoAnswer
-from tui.drive.read_plan import Place, ReadPlan, ReadRequest
+from tui.bus.poll_plan import PlannedRead
+from tui.drive.read_plan import Place, ReadPlan, ReadRequest, SlotCheck
+from tui.safety import SOURCE_AGE
 from tui.session.drive import DriveSession
 from tui.session.read.kept_plans import PLANS_KEPT
-from tui.session.read.reader import Reader
+from tui.session.read.reader import ASK_AGAIN, Reader
+from tui.session.reading import Origin, Reading
 from tui.session.shown import Quality, Rating
 
+from .fake_clock import FakeClock
 from .fakes import BlockDrive, OneDrive, parameter, profile_of
 
 INR = {"parameter": "INR", "scales": {"0": "0.01", "1": "0.1", "2": "1"}}
@@ -87,6 +92,24 @@ async def test_ramp_is_read_with_its_increment() -> None:
     assert (await reader.read(["ACC"]))["ACC"].text == "30"
 
 
+async def test_poll_reads_an_increment_again_only_after_its_time() -> None:
+    profile = profile_of(
+        parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR), parameter("INR", 9020)
+    )
+    line, clock = OneDrive({9001: 30, 9020: 0}), FakeClock()
+    reader = Reader(DriveSession(line, 1, profile, clock=clock))
+
+    async def reads(priority: Priority) -> int:
+        line.requests.clear()
+        await reader.read(["ACC"], priority=priority)
+        return len([address for address, _ in line.requested if address == 9020])
+
+    assert await reads(Priority.POLL) == 1
+    assert [await reads(each) for each in (Priority.POLL, Priority.OPERATOR_READ)] == [0, 1]
+    clock.advance(SOURCE_AGE + 1.0)
+    assert await reads(Priority.POLL) == 1
+
+
 async def test_ramp_without_its_increment_is_shown_raw() -> None:
     profile = profile_of(
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR), parameter("INR", 9020)
@@ -117,6 +140,7 @@ async def test_percentage_is_in_amperes_once_the_rating_is_known() -> None:
     assert readings["FE03"].physical is None
     assert readings["OWN"].physical is not None
     assert readings["OWN"].physical.display == "4.2 A"
+    assert (readings["OWN"].physical.raw, readings["OWN"].physical.number) == (50, Decimal("4.2"))
     reader.session.ratings["FE03"] = Rating(Decimal("9.1"), "A")
     again = (await reader.read(["FE03"]))["FE03"]
     assert again.physical is not None
@@ -224,6 +248,39 @@ async def test_each_answer_shows_that_the_drive_was_not_switched_off() -> None:
     assert here.answers == 2
 
 
+@pytest.mark.parametrize(
+    ("values", "slot", "kept", "since"),
+    [({"P1": 7.0}, 9, ["P1"], 7.0), ({"P1": 7.0}, 8, [], 7.0), ({}, 9, [], -math.inf)],
+)
+async def test_values_of_a_scanner_count_if_its_slots_are_as_before(
+    values: dict[str, float], slot: int, kept: list[str], since: float,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """The slots are read after the values; a scanner that refuses has none."""
+    here, sent, forgotten = Planned(), list[tuple[object, ...]](), list[int]()
+    cast(Any, here.reader._slots).learned = 5.0
+    cast(Any, here.reader._slots).forget = lambda: forgotten.append(1)
+    block = ReadRequest(700, 1, (Place("P1", 0),))
+    slots = ReadRequest(2165, 1, (Place("S1", 0),))
+    answers = {700: {code: SimpleNamespace(time=time, raw=1) for code, time in values.items()},
+               2165: {"S1": SimpleNamespace(time=8.0, raw=slot)}}  # fmt: skip
+
+    async def exchange(_: object, request: Any, priority: Priority, since: float) -> Any:
+        sent.append((request, priority, since))
+        return dict(answers[request.address])
+
+    monkeypatch.setattr(Reader, "_exchange", exchange)
+    monkeypatch.setattr(
+        Reader, "_block_of",
+        lambda _, request: SimpleNamespace(name="Scanner") if request is block else None,
+    )  # fmt: skip
+    plan = ReadPlan((block,), 0.0, (SlotCheck(slots, {"S1": 9}, ("P1", "P2")),))
+    assert list(await here.reader._follow(plan, Priority.POLL)) == kept
+    assert sent == [(block, Priority.POLL, 5.0), (slots, Priority.POLL, since)]
+    assert len(forgotten) == (slot != 9)
+    assert here.reader.using == "Scanner"
+
+
 async def test_word_of_doubtful_documents_is_read_once_and_alone() -> None:
     line = OneDrive({1: 1, 2: 2})
     functions = [{"code": 3, "name": "Read", "max_read": 20, "past_limit": "silence"}]
@@ -285,3 +342,87 @@ async def test_word_of_a_block_is_certain_only_if_it_is_read_alone(
     found = await reader._exchange(request, Priority.POLL)
     assert list(found) == ([] if block else ["P1"])
     assert all("refused" in reading.error for reading in found.values())
+
+
+# -- one request of a plan -------------------------------------------------------------------------
+
+
+def timed_reader(**block: object) -> tuple[Reader, OneDrive]:
+    """A reader at the time 100, of a drive with words 1 and 2, and perhaps a block."""
+    tables: dict[str, Any] = {"blocks": [block]} if block else {}
+    profile = profile_of(parameter("P1", 1), parameter("P2", 2), parameter("S1", 50), **tables)
+    line = OneDrive({1: 7, 2: 8})
+    clock = cast(Any, SimpleNamespace(monotonic=lambda: 100.0, line_time=lambda time: time))
+    return Reader(DriveSession(line, 1, profile, clock=clock)), line
+
+
+PAIR = ReadRequest(1, 2, (Place("P1", 0), Place("P2", 1)))
+
+
+def test_refusal_is_repeated_by_a_poll_after_its_time_and_a_silence_never() -> None:
+    reader, _ = timed_reader()
+
+    def refused(code: str, time: float, *, silent: bool = False) -> None:
+        bad = Reading.bad(reader.profile[code], time, "none", silent=silent)
+        reader.session.image.take({code: bad})
+
+    refused("P1", 100.0 - ASK_AGAIN)
+    refused("P2", 100.0 - ASK_AGAIN + 0.5)
+    refused("S1", 1.0, silent=True)
+    assert set(reader._still_refused(frozenset({"P1", "P2", "S1"}))) == {"P2", "S1"}
+    assert set(reader._still_refused(frozenset({"P1"}))) == set()
+
+
+async def test_refusal_of_several_words_concerns_none_of_them_for_certain() -> None:
+    reader, line = timed_reader()
+    line.registers.clear()
+    assert await reader._exchange(PAIR, Priority.POLL) == {}
+    (reading,) = (
+        await reader._exchange(ReadRequest(1, 1, PAIR.places[:1]), Priority.POLL)
+    ).values()
+    assert reading.raw is None
+
+
+@pytest.mark.parametrize("priority", [*Priority])
+async def test_only_a_poll_takes_what_the_keeper_has_read(priority: Priority) -> None:
+    reader, line = timed_reader()
+    taken: list[tuple[object, float]] = []
+
+    def take(read: object, since: float) -> Reply:
+        taken.append((read, since))
+        return Reply((3, 4), 99.0, b"")
+
+    reader._polled = cast(Any, SimpleNamespace(take=take))
+    found = await reader._exchange(PAIR, priority, 5.0)
+    polls = priority >= Priority.POLL
+    assert [reading.raw for reading in found.values()] == ([3, 4] if polls else [7, 8])
+    assert taken == ([(PlannedRead(1, 2, 3), 5.0)] if polls else [])
+    assert len(line.requested) == (not polls)
+    assert {reading.origin for reading in found.values()} == {Origin.POLL if polls else Origin.READ}
+
+
+def test_shared_reply_may_be_as_old_as_what_is_known() -> None:
+    reader, _ = timed_reader()
+    assert reader._longest(PAIR, Priority.POLL, 5.0) == 0.0
+    reader.max_age = 2.0
+    assert [reader._longest(PAIR, Priority.POLL, since) for since in (5.0, 99.5, 101.0)] == [
+        2.0, 0.5, 0.0,
+    ]  # fmt: skip
+    assert reader._longest(PAIR, Priority.OPERATOR_READ, 5.0) == 0.0
+    reader.session.image.confirm("P2", 8, 99.0)
+    assert reader._longest(PAIR, Priority.POLL, 5.0) == 1.0
+
+
+def test_block_is_known_by_its_registers() -> None:
+    reader, _ = timed_reader(
+        id="block", name="Block", direction="read", address=700, min_words=1, max_words=3,
+        slots=["S1"], selects_by="address", effective="at-once", choices=[], fixed_start=False,
+    )  # fmt: skip
+
+    def name(address: int) -> str | None:
+        found = reader._block_of(ReadRequest(address, 1, (Place("P1", 0),)))
+        return found.name if found is not None else None
+
+    assert [name(address) for address in (699, 700, 702, 703)] == [None, "Block", "Block", None]
+    assert reader._block_of(PAIR) is None
+    assert reader._block_of(ReadRequest(0, 2, (Place("P1", 1),))) is None

@@ -187,7 +187,10 @@ async def test_stop_reports_tasks_that_had_not_begun_and_nothing_else(reported: 
     assert reported.queue.outcome is None, "nothing was dropped"
     reported.arming.arm()
     reported.put("a")
+    texts: list[str] = []
+    reported.queue.on_report = lambda outcome: texts.append(outcome.text)
     reported.queue.stop("F9")  # before the loop could begin
+    assert set(texts) == {DROPPED_BY_STOP}
     assert reported.outcome() == (OutcomeKind.REFUSED, DROPPED_BY_STOP)
     assert reported.queue.outcome is not None
     assert isinstance(reported.queue.outcome.error, Stopped)

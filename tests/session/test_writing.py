@@ -6,8 +6,10 @@ import asyncio
 import math
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Any
+from typing import Any, cast
+from unittest.mock import Mock
 
+import msgspec
 import pytest
 
 from tui.bus.api import Priority, Reply
@@ -15,10 +17,12 @@ from tui.bus.errors import DeviceException, LineError, NoAnswer, RequestRefused,
 from tui.bus.fake_device import FakeDevice
 from tui.bus.requests import WriteOne
 from tui.session.arming import NotArmed
+from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.journal import Entry, Journal
 from tui.session.journal_reading import completed, read_journal
 from tui.session.read.reader import Reader
+from tui.session.reading import Reading
 from tui.session.settings.write import (
     CUT_SHORT,
     NotTaken,
@@ -316,6 +320,7 @@ async def test_write_cut_by_a_stop_is_not_recorded_as_done(
     await begun.wait()
     task.cancel()
     await asyncio.wait([task])
+    assert task.cancelled()
     await Reader(session).read(["ACC"])
     cut, later = abilities_in(journal)
     found = "Not accepted: it holds 3.0 s, read back later."
@@ -423,6 +428,51 @@ async def test_write_without_a_read_back_is_not_compared(
     assert (entry.answer, entry.read_back) == ("ok", None)
 
 
+async def test_journal_knows_what_was_sent_and_what_the_drive_refused(
+    line: WilfulLine, session: DriveSession, journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    entries: list[dict[str, Any]] = []
+    made = parameter_entry
+
+    def noted(*of: Any, **how: Any) -> Entry:
+        entries.append(how)
+        return made(*of, **how)
+
+    monkeypatch.setattr("tui.session.settings.write.parameter_entry", noted)
+    for error in (DeviceException(1, 6, 10, code=2), RequestRefused("a stop came before")):
+        line.fail_write(1, 10, error, times=1)
+        with pytest.raises(type(error)):
+            await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
+    assert [entry["refused"] for entry in entries] == [True, False]
+    assert len(journal.recent) == 2
+    assert [entry.answer for entry in journal.sent] == [journal.recent[0].answer]
+
+
+async def test_write_of_a_saved_setting_is_noted_with_the_value_before_it(
+    line: WilfulLine, session: DriveSession, journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    noted: list[tuple[object, ...]] = []
+    monkeypatch.setattr(Writer, "_note_unsaved", lambda _, *of: noted.append(of))
+    await Reader(session).read(["ACC"])
+    word = msgspec.structs.replace(PROFILE["ACC"], storage="ram-until-saved")
+    await writer(session, journal).write_parameter(word, 50, why="setting")
+    assert noted == [(word, 30, 50)]
+
+
+@pytest.mark.internal_errors
+async def test_error_of_the_journal_fails_a_setting_and_no_stop(
+    session: DriveSession, caplog: pytest.LogCaptureFixture
+) -> None:
+    broken = cast(Any, Mock(add=Mock(side_effect=ValueError("on purpose"))))
+    with pytest.raises(ValueError, match="on purpose"):
+        await writer(session, broken).write_parameter(PROFILE["ACC"], 50, why="setting")
+    assert not caplog.messages
+    await Writer(session, broken, None).write_parameter(
+        PROFILE["CMD"], 7, why="a stop", priority=Priority.STOP, read_back=False
+    )
+    assert caplog.messages == ["a stop of device 1 is not in the journal"]
+
+
 async def test_field_keeps_the_other_bits_of_its_word(journal: Journal) -> None:
     functions = [{"code": 3, "name": "Read", "max_read": 29}, {"code": 6, "name": "Write"}]
     fields = (parameter("LOW", 10, mask=0x000F), parameter("HIGH", 10, mask=0x00F0))
@@ -464,6 +514,34 @@ async def test_later_read_completes_the_entry_by_the_bits_that_were_to_be_writte
         "read-back", entry.time, text, back,
     )  # fmt: skip
     assert (found.code, found.why) == ("ACC", "a test")
+
+
+@pytest.mark.parametrize(("refused", "use"), [(False, "write"), (True, "")])
+async def test_entry_of_a_stored_write_names_its_drive_and_its_values(
+    refused: bool, use: str, session: DriveSession
+) -> None:
+    """Without its scale, the value is recorded in the scale of a drive that lacks the word."""
+    session.identity = DriveIdentity(1, "Nobody", "Drive 7", "", "", None, ())
+    older = {**INR, "absent": "0.1"}
+    profile = profile_of(parameter("ACC", 10, unit="s", scale_by=older), parameter("INR", 11))
+    session.profile = profile
+    session.image.take({"INR": Reading.bad(profile["INR"], 5.0, "none", absent=True)})
+    word = msgspec.structs.replace(profile["ACC"], storage="eeprom")
+    entry = parameter_entry(
+        session, word, old=30, new=50, answer="ok", why="a test", read_back=50, refused=refused
+    )
+    assert (entry.eeprom, entry.drive) == (use, "Nobody Drive 7" if use else "")
+    assert (entry.old_raw, entry.old, entry.new_raw, entry.new) == (30, "3.0 s", 50, "5.0 s")
+    assert (entry.answer, entry.read_back, entry.kind) == ("ok", 50, "write")
+
+
+async def test_write_reports_if_the_value_was_read_back(
+    session: DriveSession, journal: Journal
+) -> None:
+    at_work = writer(session, journal)
+    assert await at_work.write_parameter(PROFILE["ACC"], 50, why="setting")
+    assert not await at_work.write_parameter(PROFILE["ACC"], 50, why="setting", read_back=False)
+    assert not await at_work.write_parameter(PROFILE["CMD"], 7, why="command")
 
 
 EXCEPTIONS = [
