@@ -1,0 +1,99 @@
+"""All faults of a profile with a row in nearly every table, each broken in one place.
+
+`whole_profile_faults.txt` has, for each change, its place, the new value, and below it all faults
+with their places. A place is a path from the top of the file, and rows count from 0.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+
+from tui.drive.errors import ProfileError
+from tui.drive.profile import check, library
+from tui.drive.profile.converting import converted
+from tui.drive.profile.schema import ProfileData
+from tui.drive.profile.shared_rows import ProfileTables
+from tui.drive.profile.toml_lines import TomlPath
+
+HERE = Path(__file__).parent
+WHOLE = HERE / "whole.toml"
+FAULTS = HERE / "whole_profile_faults.txt"
+NOTHING = "no fault"
+
+
+class Placed(ProfileTables):
+    """Tables whose places are shown as paths, without a file."""
+
+    def place(self, path: TomlPath) -> tuple[str, int]:
+        return ".".join(map(str, path)) or "-", 0
+
+
+def faults_of(tables: dict[str, Any]) -> list[str]:
+    sources = Placed(tables)
+    try:
+        data = converted(tables, ProfileData)
+    except msgspec.ValidationError:
+        faults = check._faults_of_form(sources)
+    else:
+        faults = check._in_order(check._placed(sources, check._broken_rules(data)))
+    return [f"{fault.file}: {fault.text}" for fault in faults] or [NOTHING]
+
+
+def change(tables: dict[str, Any], place: str, value: str) -> dict[str, Any]:
+    """The tables with another value at a place, or without it; what stays is shared."""
+    changed: Any = dict(tables)
+    node: Any = changed
+    *path, last = place.split(".")
+    for step in path:
+        key = int(step) if isinstance(node, list) else step
+        node[key] = list(node[key]) if isinstance(node[key], list) else dict(node[key])
+        node = node[key]
+    key = int(last) if isinstance(node, list) else last
+    if value == "absent":
+        del node[key]
+    else:
+        node[key] = json.loads(value)
+    return changed  # type: ignore[no-any-return]
+
+
+def changes() -> Iterator[tuple[str, str, list[str]]]:
+    for block in FAULTS.read_text("utf-8").split("\n\n"):
+        head, *faults = block.strip("\n").split("\n")
+        place, _, value = head.partition(" = ")
+        yield place, value, [fault.strip() for fault in faults]
+
+
+@pytest.mark.parametrize("part", range(8))
+def test_each_change_of_a_whole_profile_has_its_faults(part: int) -> None:
+    tables = tomllib.loads(WHOLE.read_text("utf-8"))
+    assert faults_of(tables) == [NOTHING]
+    rows = list(changes())[part::8]
+    for place, value, faults in rows:
+        assert faults_of(change(tables, place, value)) == faults, f"{place} = {value}"
+
+
+def test_error_of_a_profile_names_ten_faults_and_counts_the_others(tmp_path: Path) -> None:
+    path = tmp_path / "whole.toml"
+    text = WHOLE.read_text("utf-8")
+    lines = [n for n, line in enumerate(text.splitlines(), 1) if line == 'access = "r"']
+    for count in (10, 12):
+        path.write_text(text.replace('access = "r"', 'access = "x"', count), "utf-8")
+        with pytest.raises(ProfileError) as refused:
+            library.load_file(path)
+        faults = str(refused.value).splitlines()
+        assert [fault.split(": ")[0] for fault in faults[:10]] == [
+            f"{path}:{n}" for n in lines[:10]
+        ]
+        more = ["... and 2 more faults; profiles --check lists all."] if count == 12 else []
+        assert faults[10:] == more
+        assert faults[0].endswith(
+            ": parameters.#1.access (STAT): 'x' is not an allowed value. Allowed: r, rw,"
+            " rw-stopped, w."
+        )
