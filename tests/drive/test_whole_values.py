@@ -6,16 +6,14 @@ or the error. Read a changed line as a sentence of its own, and change the file 
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Iterator
 from decimal import Decimal
 from functools import cache
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import pytest
 
+from tests.recorded import result, sections, short
 from tui.drive import (
     causes,
     channel,
@@ -64,34 +62,6 @@ TYPED = (
 @cache
 def whole() -> Profile:
     return library.load_file(HERE / "whole.toml")
-
-
-def result(call: Callable[..., Any], *args: Any, **named: Any) -> str:
-    try:
-        found = call(*args, **named)
-    except DriveError as error:
-        return f"{type(error).__name__}: {error}"
-    return short(found)
-
-
-def short(found: object) -> str:
-    """A result in short: rows of a profile by their name, other objects by their fields."""
-    match found:
-        case msgspec.Struct():
-            names = (getattr(found, name, "") for name in ("code", "id", "parameter", "name"))
-            return f"<{next(filter(None, names))}>"
-        case list() | tuple():
-            return f"[{', '.join(map(short, found))}]"
-        case set() | frozenset():
-            return short(sorted(found))
-        case dict():
-            return f"{{{', '.join(f'{key}: {short(item)}' for key, item in found.items())}}}"
-        case Decimal():
-            return str(found)
-    if dataclasses.is_dataclass(found) and not isinstance(found, type):
-        parts = (getattr(found, field.name) for field in dataclasses.fields(found))
-        return f"{type(found).__name__}({', '.join(map(short, parts))})"
-    return repr(found)
 
 
 def parameters() -> Iterator[str]:
@@ -328,13 +298,8 @@ SECTIONS = (
 )  # fmt: skip
 
 
-def expected() -> dict[str, str]:
-    parts = TEXTS.read_text("utf-8").split("\n== ")
-    return {name: text for name, _, text in (part.partition("\n") for part in parts[1:])}
-
-
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)
 def test_functions_return_what_is_recorded_for_a_whole_profile(
     section: Callable[[], Iterator[str]],
 ) -> None:
-    assert "\n".join(section()) == expected()[section.__name__]
+    assert "\n".join(section()) == sections(TEXTS)[section.__name__]

@@ -1,0 +1,54 @@
+"""Results as text, and the texts that tests compare with: sections of a file beside the test."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterable, Iterator
+from decimal import Decimal
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from tui.drive.errors import DriveError
+
+
+def sections(path: Path) -> dict[str, str]:
+    """The text of each section of a file; a line `== NAME` begins one."""
+    parts = path.read_text("utf-8").split("\n== ")
+    return {name: text for name, _, text in (part.partition("\n") for part in parts[1:])}
+
+
+def write_sections(path: Path, found: Iterable[tuple[str, Iterable[str]]]) -> None:
+    """Write what functions return now, to be read before it is accepted."""
+    texts = (f"\n== {name}\n" + "\n".join(lines) for name, lines in found)
+    path.write_text("".join(texts) + "\n== end\n", "utf-8")
+
+
+def result(call: Callable[..., Any], *args: Any, **named: Any) -> str:
+    """What a function returns, or its error, in short."""
+    try:
+        found = call(*args, **named)
+    except DriveError as error:
+        return f"{type(error).__name__}: {error}"
+    return short(list(found) if isinstance(found, Iterator) else found)
+
+
+def short(found: object) -> str:
+    """A result in short: rows of a profile by their name, other objects by their fields."""
+    match found:
+        case msgspec.Struct():
+            names = (getattr(found, name, "") for name in ("code", "id", "parameter", "name"))
+            return f"<{next(filter(None, names), type(found).__name__)}>"
+        case list() | tuple():
+            return f"[{', '.join(map(short, found))}]"
+        case set() | frozenset():
+            return short(sorted(found))
+        case dict():
+            return f"{{{', '.join(f'{key}: {short(item)}' for key, item in found.items())}}}"
+        case Decimal():
+            return str(found)
+    if dataclasses.is_dataclass(found) and not isinstance(found, type):
+        parts = (getattr(found, field.name) for field in dataclasses.fields(found))
+        return f"{type(found).__name__}({', '.join(map(short, parts))})"
+    return repr(found)
