@@ -1,8 +1,13 @@
-"""Results as text, and the texts that tests compare with: sections of a file beside the test."""
+"""Results as text, and the texts that tests compare with: sections of a file beside the test.
+
+After an intended change, `python -m tests.recorded` writes these files again. Read what has changed
+in them as what a person will see, before you commit it.
+"""
 
 from __future__ import annotations
 
 import dataclasses
+import importlib
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
 from pathlib import Path
@@ -19,9 +24,9 @@ def sections(path: Path) -> dict[str, str]:
     return {name: text for name, _, text in (part.partition("\n") for part in parts[1:])}
 
 
-def write_sections(path: Path, found: Iterable[tuple[str, Iterable[str]]]) -> None:
-    """Write what functions return now, to be read before it is accepted."""
-    texts = (f"\n== {name}\n" + "\n".join(lines) for name, lines in found)
+def write_sections(path: Path, found: Iterable[Callable[[], Iterable[str]]]) -> None:
+    """Write what each function returns now."""
+    texts = (f"\n== {each.__name__}\n" + "\n".join(each()) for each in found)
     path.write_text("".join(texts) + "\n== end\n", "utf-8")
 
 
@@ -52,3 +57,13 @@ def short(found: object) -> str:
         parts = (getattr(found, field.name) for field in dataclasses.fields(found))
         return f"{type(found).__name__}({', '.join(map(short, parts))})"
     return repr(found)
+
+
+RECORDED = ("drive.test_whole_values", "drive.test_whole_files")
+"""Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
+
+if __name__ == "__main__":
+    for name in RECORDED:
+        module = importlib.import_module(f"tests.{name}")
+        write_sections(module.TEXTS, module.SECTIONS)
+    importlib.import_module("tests.drive.test_whole_profile").write_faults()

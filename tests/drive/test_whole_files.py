@@ -68,7 +68,7 @@ def set_files() -> Iterator[str]:
             yield f"{old} -> {new}: {type(error).__name__}: {error}"
             continue
         changed = {c: r for c, r in read.raws.items() if HELD.get(c) != r}
-        yield f"{old} -> {new}: {changed} {set(HELD) - set(read.raws)} {short(read.absent)}"
+        yield f"{old} -> {new}: {changed} {sorted(set(HELD) - set(read.raws))} {short(read.absent)}"
         yield f"  {read.unknown} {read.notes} {sorted(read.lossy)} {read.lines.get('ACCE')}"
 
 
@@ -81,7 +81,7 @@ def restoring() -> Iterator[str]:
                Options(rating=True, rounded=True))  # fmt: skip
     for own, options in product((source, other_type), choices):
         plan = plan_restore(profile, held, own, profile, options)
-        yield f"{options}: {plan.same_rating} {plan.needs_stop} {plan.across}"
+        yield f"{short(options)}: {plan.same_rating} {plan.needs_stop} {plan.across}"
         for item in plan.items:
             yield f"  {item}"
         yield f"  {[(edit.code, edit.old, edit.new, edit.text) for edit in plan.edits]}"

@@ -70,6 +70,16 @@ def changes() -> Iterator[tuple[str, str, list[str]]]:
         yield place, value, [fault.strip() for fault in faults]
 
 
+def write_faults() -> None:
+    """Write the faults of the same changes as they are now."""
+    tables = tomllib.loads(WHOLE.read_text("utf-8"))
+    blocks = []
+    for place, value, _ in changes():
+        faults = faults_of(change(tables, place, value))
+        blocks.append("\n".join([f"{place} = {value}", *(f"  {fault}" for fault in faults)]))
+    FAULTS.write_text("\n\n".join(blocks) + "\n", "utf-8")
+
+
 @pytest.mark.parametrize("part", range(8))
 def test_each_change_of_a_whole_profile_has_its_faults(part: int) -> None:
     tables = tomllib.loads(WHOLE.read_text("utf-8"))

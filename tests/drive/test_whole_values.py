@@ -117,7 +117,7 @@ def writing() -> Iterator[str]:
             yield f"  {name}: {limit and limit.text}"
             yield f"  {short(factory.factory_value(profile, own, raws))}"
             yield f"    {factory.not_factory(profile, own, raws)} {limits.limits_are_sure(own)}"
-        yield f"  {factory.factory_sources(own)} {limits.limit_sources(profile, [own.code])}"
+        yield f"  {factory.factory_sources(own)} {short(limits.limit_sources(profile, [own.code]))}"
 
 
 def edits() -> Iterator[str]:
@@ -187,7 +187,7 @@ def states() -> Iterator[str]:
     profile = whole()
     own = profile.data.charts[0]
     for word in range(0x0A):
-        yield f"{word}: {chart.state_of(own, word).id}"
+        yield f"{word}: {chart.state_of(own, {'STAT': word}).id}"
     for number, raws in enumerate((HELD, OTHER, {}, {**HELD, "STAT": 0}, {**OTHER, "STAT": 1})):
         yield f"{number}: {short(chart.read_chart(profile, raws))}"
         yield f"  {result(channel.command_channel, profile, raws)}"
