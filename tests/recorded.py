@@ -1,7 +1,7 @@
 """Results as text, and the texts that tests compare with: sections of a file beside the test.
 
-After an intended change, `python -m tests.recorded` writes these files again. Read what has changed
-in them as what a person will see, before you commit it.
+After an intended change, `python -m tests.recorded` writes these files again. Read the
+differences before you commit them: a person will see them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ def write_sections(path: Path, found: Iterable[Callable[[], Iterable[str]]]) -> 
 
 
 def result(call: Callable[..., Any], *args: Any, **named: Any) -> str:
-    """What a function returns, or its error, in short."""
+    """The result of a function, or its error, in short."""
     try:
         found = call(*args, **named)
     except DriveError as error:
@@ -59,7 +59,7 @@ def short(found: object) -> str:
     return repr(found)
 
 
-RECORDED = ("drive.test_whole_values", "drive.test_whole_files")
+RECORDED = ("drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files")
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 
 if __name__ == "__main__":
