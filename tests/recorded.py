@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import dataclasses
 import importlib
+import os
+import time
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
 from pathlib import Path
@@ -59,10 +61,15 @@ def short(found: object) -> str:
     return repr(found)
 
 
-RECORDED = ("drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files")
+RECORDED = (
+    "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
+    "session.test_recorded_texts",
+)  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 
 if __name__ == "__main__":
+    os.environ["TZ"] = "UTC"
+    time.tzset()
     for name in RECORDED:
         module = importlib.import_module(f"tests.{name}")
         write_sections(module.TEXTS, module.SECTIONS)
