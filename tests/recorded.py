@@ -63,7 +63,7 @@ def short(found: object) -> str:
 
 RECORDED = (
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
-    "session.test_recorded_texts",
+    "session.test_recorded_texts", "ui.test_recorded_drawings",
 )  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 

@@ -189,9 +189,9 @@ def diagnoses() -> Iterator[str]:
             yield f"{named(facts)} {type(link).__name__} {known is not None}"
             yield f"  {found.rung}: {found.text} {found.certainty} {found.others}"
             yield from (f"  > {step}" for step in found.steps)
-    for one, other in islice(combinations(SIGHTS, 2), 0, None, 11):
-        if not one.keys() & other.keys():
-            yield diagnosed(replace(plain, **one, **other)).rung
+    for first, second in islice(combinations(SIGHTS, 2), 0, None, 11):
+        if not first.keys() & second.keys():
+            yield diagnosed(replace(plain, **first, **second)).rung
 
 
 def redactions() -> Iterator[str]:
