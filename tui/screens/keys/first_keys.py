@@ -6,6 +6,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
+from tui.drive.plain import plain
 from tui.session.paths import state_folder
 from tui.session.stored import store_json, stored_json
 
@@ -34,7 +35,8 @@ def remember() -> None:
 
 def unknown_text(data: bytes) -> str:
     """Return the message for a sequence that no known terminal sends."""
-    shown = "".join("ESC " if byte == 0x1B else chr(byte) for byte in data if byte < 0x7F)
+    bytes_shown = ("ESC " if byte == 0x1B else plain(chr(byte)) for byte in data if byte < 0x7F)
+    shown = "".join(bytes_shown)
     return (
         f"An unknown key arrived ({shown.strip()}). If it was F12, F12 does nothing on this"
         " terminal. Stop with Space, or set the terminal to send xterm keys."
