@@ -9,6 +9,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import os
+import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from decimal import Decimal
@@ -63,14 +64,16 @@ def short(found: object) -> str:
 
 RECORDED = (
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
-    "session.test_recorded_texts", "ui.test_recorded_drawings",
+    "session.test_recorded_texts", "ui.test_recorded_drawings", "cli.test_recorded_refusals",
 )  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 
 if __name__ == "__main__":
-    os.environ["TZ"] = "UTC"
-    time.tzset()
-    for name in RECORDED:
-        module = importlib.import_module(f"tests.{name}")
-        write_sections(module.TEXTS, module.SECTIONS)
+    with tempfile.TemporaryDirectory() as folder:
+        own = {f"DRIVEPANEL_{name}": f"{folder}/{name}" for name in ("CONFIG", "STATE")}
+        os.environ.update(own, HOME=folder, TZ="UTC", LC_ALL="C.UTF-8", DRIVEPANEL_RECORD="off")
+        time.tzset()
+        for name in RECORDED:
+            module = importlib.import_module(f"tests.{name}")
+            write_sections(module.TEXTS, module.SECTIONS)
     importlib.import_module("tests.drive.test_whole_profile").write_faults()
