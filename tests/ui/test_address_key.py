@@ -95,6 +95,20 @@ async def test_typed_address_selects_a_drive_on_line(monkeypatch: pytest.MonkeyP
         assert made.stopped == [31]
 
 
+async def test_message_is_drawn_once_while_a_dialog_is_open(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with typing(monkeypatch) as made:
+        made.app.tell("A message of two rows. " * 5)
+        await until(made.pilot, lambda: made.app.connection.message_rows == 2)
+        await made.type("3")
+        made.app.tell("A short one.")
+        dialog = made.app.screen
+        await until(made.pilot, lambda: "A short one." in shown(made.app, "said"))
+        assert isinstance(dialog, AddressField)
+        assert dialog.message_rows == 2  # else the first row of the screen below appears again
+
+
 async def test_typed_address_keeps_the_screen_of_a_drive(monkeypatch: pytest.MonkeyPatch) -> None:
     async with typing(monkeypatch) as made:
         assert made.app.chosen is not None

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import takewhile
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -109,6 +110,8 @@ class Framed(Screen[Any]):
             ],
         }
         if self.is_modal:
+            # the rows of the screen below stay as they are while a dialog is open
+            parts["said"] += [Text("")] * (self._rows_below() - len(parts["said"]))
             stops = stop_keys(self.app.stop_target_text, typing=takes_space(self.focused))
             parts[DIALOG_KEYS] = [key_line(stops)]
         return parts
@@ -170,6 +173,11 @@ class Framed(Screen[Any]):
             if place == "said" and self.message_rows != len(lines):
                 part.styles.height = len(lines)
             part.show(lines)
+
+    def _rows_below(self) -> int:
+        """Rows of the message areas that a dialog must cover."""
+        screens = takewhile(lambda screen: screen is not self, self.app.screen_stack)
+        return max((each.message_rows for each in screens if isinstance(each, Framed)), default=0)
 
     @property
     def message_rows(self) -> int:
