@@ -177,6 +177,14 @@ def test_evidence_of_a_real_drive_proves_a_parameter_on_this_site(
     assert proved.source.endswith("; confirmed on ATV21H075M3X 1.2, 2026-03-01")
 
 
+def test_evidence_of_a_drive_of_another_family_proves_nothing(
+    tmp_path: Path, statement: str
+) -> None:
+    stranger = evidence("confirmed", statement)
+    stranger.findings.append(EvidenceFinding(subject="identity", name="", result="contradicted"))
+    assert not is_verified(judged_by(tmp_path, stranger))
+
+
 def test_evidence_lifts_an_unproved_profile_for_its_values_only(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -188,7 +188,9 @@ def _say_result(evidence: ProfileEvidence, path: Path, *, err: bool) -> None:
         err=err,
     )
     proved = sum(f.subject == "value" and f.result == "confirmed" for f in evidence.findings)
-    if evidence.tested.kind != "drive":
+    if evidence.is_of_another_family:
+        say("It proves nothing: the drive is of another family.", err=err)
+    elif evidence.tested.kind != "drive":
         say("It proves nothing: no person has said that this is a real drive.", err=err)
     elif proved:
         texts = ("1 value is proved on this site.", "{count} values are proved on this site.")

@@ -75,6 +75,8 @@ def with_evidence(data: ProfileData, known: Iterable[ProfileEvidence]) -> Profil
     for evidence in known:
         if evidence.profile != data.profile.id or evidence.tested.kind != "drive":
             continue
+        if evidence.is_of_another_family:
+            continue
         for found in evidence.findings:
             if found.subject == "value" and found.result != "open":
                 latest[found.name] = (found, evidence)

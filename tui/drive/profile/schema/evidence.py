@@ -54,3 +54,9 @@ class ProfileEvidence(Table, frozen=True, kw_only=True):
     def count(self, result: EvidenceResult) -> int:
         """Return the number of findings with a result."""
         return sum(finding.result == result for finding in self.findings)
+
+    @property
+    def is_of_another_family(self) -> bool:
+        """True if the drive said that it is of another family: then it proves nothing."""
+        wrong = (f for f in self.findings if f.result == "contradicted")
+        return any(f.subject == "identity" for f in wrong)
