@@ -182,13 +182,16 @@ def test_wait_that_is_wrong_is_refused_at_its_line(tmp_path: Path, waits: str, t
     assert_refused(tmp_path, [*SEQUENCE, forward(waits)], text, 'id = "forward"')
 
 
-def test_sequence_longer_than_ten_seconds_and_a_stop_with_waits_are_refused(
+def test_sequence_that_is_too_long_or_that_has_no_use_for_waits_is_refused(
     tmp_path: Path,
 ) -> None:
     long = FORWARD.replace("words = [1]", "words = [4, 5, 6, 7], waits = [{}, {}, {}]")
     long = long.replace("{}", "{ ms = 4000 }")
     text = "order forward: its waits take 12 s. Allowed are 10 s for one command."
     assert_refused(tmp_path, [*SEQUENCE, (FORWARD, long)], text, 'id = "forward"')
+    walk = ('command = "CTRL"', 'command = "CTRL"\nruns_in = "running"')
+    text = "order forward: its start follows the transitions and waits for each state."
+    assert_refused(tmp_path, [*SEQUENCE, walk, forward("{ ms = 50 }")], text, 'id = "forward"')
     stop = ("words = [0] }", "words = [6, 0], waits = [{ ms = 50 }] }")
     text = "order stop: a stop never waits. Delete its waits."
     assert_refused(tmp_path, [*SEQUENCE, stop], text, 'id = "stop"')
