@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,7 +11,7 @@ from tui.drive.plain import plain
 
 from ..shared.completion import complete_profile
 from ..shared.drive_commands import arm_option, need_arming
-from ..shared.errors import DIFFERENT, USAGE, Failure, end_with
+from ..shared.errors import DIFFERENT, end_with
 from ..shared.line_argument import named_line_of
 from ..shared.options import SLAVE_ADDRESS, Target, json_option
 from ..shared.registration import WRITING, command
@@ -75,6 +74,20 @@ PARAMETER_COLUMNS = (
     help="Begin with the parameters of this table; for new.",
 )
 @click.option(
+    "--from-eds",
+    "sheet",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Begin with the objects of this EDS or DCF; for new.",
+)
+@click.option(
+    "--address-rule",
+    "rules",
+    multiple=True,
+    metavar="RULE",
+    help="Use this rule for addresses; for --from-eds.",
+)
+@click.option(
     "-d",
     "--device",
     type=SLAVE_ADDRESS,
@@ -109,6 +122,8 @@ def profiles(
     to: Path | None,
     force: bool,
     table: Path | None,
+    sheet: Path | None,
+    rules: tuple[str, ...],
     schema: bool,
     wiring: bool,
     as_json: bool,
@@ -116,7 +131,8 @@ def profiles(
     """List the profiles, show one, check files, or create one of your own.
 
     `path` shows the folder for your own profiles; `new NEW-ID --from ID` creates one there, and
-    `new NEW-ID --from-csv FILE` one from the parameter table of a manual.
+    `new NEW-ID --from-csv FILE` one from the parameter table of a manual. `new NEW-ID --from-eds
+    FILE --address-rule RULE` creates one from a data sheet of CANopen (EDS, DCF).
     `confirm ID LINE` compares a drive with its profile and writes the result to a file. It only
     reads. A person is asked what the display shows, for each CODE or for the usual values.
     """
@@ -150,10 +166,12 @@ def profiles(
 
         say(schema_text().rstrip())
     elif words[:1] == ("new",):
-        _begin(words[1:], origin, table and given_file(table), as_json)
+        from ..running.new_profile import begin_profile
+
+        begin_profile(words[1:], origin, table, sheet, rules, as_json)
     elif words[:1] == ("confirm",):
         _confirm(words[1:], device, to, force=force, as_json=as_json)
-    elif more or origin is not None or table is not None:
+    elif more or rules or any(part is not None for part in (origin, table, sheet)):
         raise click.UsageError("Name one ID, or: profiles new NEW-ID --from ID.")
     elif profile_id == "path":
         _tell_folder(as_json)
@@ -201,68 +219,6 @@ def _tell_folder(as_json: bool) -> None:
         print_json(ProfileFolder(folder=folder))
     else:
         say(folder)
-
-
-def _begin(words: tuple[str, ...], origin: str | None, table: Path | None, as_json: bool) -> None:
-    """Write the file of a new profile, from another or from a table; never over a file."""
-    from tui.drive.profile import library
-
-    from ..documents.other_documents import ProfileBegun
-    from ..shared.output import print_json
-
-    if len(words) != 1 or (origin is None) is (table is None):
-        raise click.UsageError(
-            "Name the new id and the profile to copy, new NEW-ID --from ID, or a table, new NEW-ID"
-            " --from-csv FILE."
-        )
-    known = {item.id: item for item in (*library.listings(), *library.public_listings())}
-    new_id = words[0].strip()
-    if new_id in known:
-        raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")
-    text = _from_table(table, new_id) if table is not None else _copied(known, origin or "", new_id)
-    start = origin.strip().lower() if origin is not None else str(table)
-    path = library.user_folder() / f"{new_id}.toml"
-    path.parent.mkdir(parents=True, exist_ok=True)
-    try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(text)
-    except FileExistsError:
-        raise click.UsageError(f"{path} already exists; nothing was written.") from None
-    if as_json:
-        print_json(ProfileBegun(id=new_id, from_=start, file=str(path)))
-        return
-    say(f"{path}")
-    if table is not None:
-        say(f"Its rows are those of {start}, with the certainty unverified. Add the commands.")
-    else:
-        say(f"It is a copy of {start}. Change it.")
-    say(f"Then: drivepanel profiles --check {path}")
-
-
-def _copied(known: Mapping[str, Listing], origin: str, new_id: str) -> str:
-    """Return the text of a copy of a profile."""
-    from tui.drive.profile import library
-    from tui.drive.profile.new_file import new_profile_text
-    from tui.drive.small_file import read_small_text
-
-    library.load(origin)  # reports a broken profile, which cannot be copied
-    source = known[origin.strip().lower()]
-    rows = library.rows_with_shared(source)
-    return new_profile_text(read_small_text(source.path), source.id, new_id, rows)
-
-
-def _from_table(table: Path, new_id: str) -> str:
-    """Return the text of a profile with the rows of a table; a byte order mark is ignored."""
-    from tui.drive.profile.csv_file import profile_from_table
-    from tui.drive.small_file import encoding_fault, read_small
-
-    try:
-        data = read_small(table).removeprefix(b"\xef\xbb\xbf")
-    except OSError as error:
-        raise Failure(f"{table}: cannot be read: {error.strerror}.", USAGE) from error
-    if fault := encoding_fault(data):
-        raise Failure(f"{table}:{fault}", USAGE)
-    return profile_from_table(data.decode("utf-8"), new_id, str(table))
 
 
 def _list(as_json: bool) -> None:

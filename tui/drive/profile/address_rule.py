@@ -34,8 +34,11 @@ class RuleError(ValueError):
     """A rule that gives no address; the text gives the reason."""
 
 
-def address_by_rule(rule: str, number: str) -> int:
-    """Return the wire address of a parameter by its number in the manual. Raises RuleError."""
+def address_by_rule(rule: str, number: str, known: Mapping[str, int] | None = None) -> int:
+    """Return the wire address of a parameter by its number in the manual. Raises RuleError.
+
+    `known` are other values than those of the number, by their names in the rule.
+    """
     if len(rule) > LONGEST_RULE:
         raise RuleError(f"a rule has at most {LONGEST_RULE} characters.")
     try:
@@ -43,7 +46,7 @@ def address_by_rule(rule: str, number: str) -> int:
     except (SyntaxError, ValueError, RecursionError, MemoryError):
         raise RuleError(f"{rule!r} is not a rule. Write it like {EXAMPLE}.") from None
     try:
-        address = _value(tree.body, _known(number), rule, number)
+        address = _value(tree.body, _known(number) if known is None else known, rule, number)
     except ZeroDivisionError:
         raise RuleError(f"{rule!r} divides by 0 for {number}.") from None
     if not 0 <= address <= 0xFFFF:
@@ -71,7 +74,7 @@ def _value(node: ast.expr, known: Mapping[str, int], rule: str, number: str) -> 
     match node:
         case ast.Constant(value=int(value)) if not isinstance(value, bool):
             return value
-        case ast.Name(id=("number" | "menu" | "item") as name):
+        case ast.Name(id=("number" | "menu" | "item" | "index" | "sub") as name):
             if name not in known:
                 raise RuleError(f"{rule!r} needs {name}, and {number!r} has none.")
             return known[name]

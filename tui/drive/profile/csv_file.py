@@ -10,7 +10,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal, InvalidOperation
 from typing import Any
 
@@ -57,7 +57,7 @@ format = "8N1"
 [[functions]]
 code = 3
 name = "Read holding registers"
-max_read = 1
+max_read = {most}
 
 [[functions]]
 code = 6
@@ -81,24 +81,37 @@ name = "{name}"
 
 def profile_from_table(text: str, new_id: str, file: str) -> str:
     """Return a profile with a row for each line of a table. Raises ProfileError."""
+    rows = list(_rows(text, file))
+    if not rows:
+        raise ProfileError(f"{file}: it has no line with a parameter.")
+    return _profile_of(rows, new_id)
+
+
+def profile_of_rows(cells: Iterable[dict[str, str]], new_id: str) -> str:
+    """Return a profile with a row for each set of cells, by field. Raises ProfileError."""
+    try:
+        return _profile_of([_converted(row) for row in cells], new_id)
+    except ValueError as error:
+        raise ProfileError(str(error)) from None
+
+
+def _profile_of(rows: list[dict[str, Any]], new_id: str) -> str:
     if not IDENTIFIER.fullmatch(new_id):
         raise ProfileError(
             f"{new_id!r} is not an id. Use small letters, digits, - and _, with a letter first."
         )
-    rows = list(_rows(text, file))
-    if not rows:
-        raise ProfileError(f"{file}: it has no line with a parameter.")
-    more = ""
+    more, most = "", 1
     if any(row.get("function") == 4 for row in rows):
         more += _FUNCTION.format(code=4, name="Read input registers", limit="max_read")
     if any(str(row.get("type", "")).endswith("32") for row in rows):
         more += _FUNCTION.format(code=16, name="Write registers", limit="max_write")
+        most = 2
     watched = [row["code"] for row in rows if "quantity" in row and row["access"] == "r"]
     values = ", ".join(
         f"{{ parameter = {escaped_toml(code)} }}" for code in watched[:MOST_MONITORED]
     )
     parts = (row_as_toml("parameters", row) for row in rows)
-    return _HEAD.format(id=new_id, more=more, watched=values) + "\n".join(parts)
+    return _HEAD.format(id=new_id, more=more, most=most, watched=values) + "\n".join(parts)
 
 
 def _rows(text: str, file: str) -> Iterator[dict[str, Any]]:
