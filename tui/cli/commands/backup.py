@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..documents.setting_documents import BackupDocument
 from ..shared.errors import DONE, DRIVE_REFUSED, INTERRUPTED, Failure, end_with
 from ..shared.options import (
     Target,
@@ -37,6 +36,8 @@ if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
+
+    from ..documents.setting_documents import BackupDocument
 
 
 RECIPES_WRITTEN = "{file}: recipes of {count} drives, which share {shared} settings."
@@ -107,6 +108,8 @@ def _document(
     target: Target, file: Path, drive: RecipeDrive, rests: dict[int, ParameterSet]
 ) -> BackupDocument:
     session, values = drive
+    from ..documents.setting_documents import BackupDocument
+
     return BackupDocument(
         **drive_fields(target.line_text, session),
         file=str(_drive_file(file, session.device)),

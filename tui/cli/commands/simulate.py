@@ -12,7 +12,6 @@ import click
 
 from tui.session.signals import handled
 
-from ..documents.other_documents import BehaviorField, SimulatedBehaviorDocument
 from ..shared.completion import complete_profile
 from ..shared.host_port import host_port, written_host_port
 from ..shared.numbers import FiniteRange
@@ -31,6 +30,8 @@ def show_about(name: str, as_json: bool) -> None:
     """Print how a simulated drive of a profile behaves, and where that is from."""
     from tui.drive.profile.library import load
     from tui.simulator.about import behaviors_of
+
+    from ..documents.other_documents import BehaviorField, SimulatedBehaviorDocument
 
     profile = load(name.casefold())
     found = behaviors_of(profile)
