@@ -171,6 +171,14 @@ async def test_named_profile_is_refused_if_its_register_has_another_value() -> N
     assert contradiction(await own_words(FakeLine({1: {100: 1}}), 1, profile), profile) == ""
 
 
+async def test_named_profile_of_another_family_is_refused_by_the_registers(packaged: None) -> None:
+    installed()
+    atv = library.load("atv71")
+    text = contradiction(await own_words(FakeLine({1: WORDS}), 1, atv), atv)
+    assert text.startswith("Device 1 has the registers of Example mixer: the profile Altivar 71")
+    assert contradiction(await own_words(FakeLine({1: {100: 1}}), 1, atv), atv) == ""
+
+
 async def test_other_profile_contradicts_the_registers(packaged: None) -> None:
     installed()
     identity = await identify_drive(FakeLine({1: WORDS}), 1)

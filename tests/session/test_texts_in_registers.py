@@ -83,6 +83,9 @@ def test_read_and_backup_of_a_simulated_drive_contain_the_text(tmp_path: Path) -
     assert read.exit_code == 0, read.output
     value = json.loads(read.stdout)["values"]["SERIAL"]
     assert (value["text"], value["raw"], value["value"]) == ("SERIAL", None, None)
+    table = CliRunner().invoke(main, ["read", f"sim:{MIXER}", "SERIAL"])
+    assert table.output.splitlines()[1].split()[:4] == ["SERIAL", "Serial", "number", "SERIAL"]
+    assert len(table.output.splitlines()[1].split()) == 7, "no raw value"
     path = tmp_path / "mixer-set.toml"
     backup = CliRunner().invoke(main, ["backup", f"sim:{MIXER}", str(path)])
     assert backup.exit_code == 0, backup.output

@@ -349,7 +349,8 @@ def _show(profile: Profile, as_json: bool) -> None:
     for parameter in profile.parameters:
         code, number, wire = notations(parameter)
         low, high = raw_range(parameter)
+        limits = "text" if parameter.type == "ascii" else f"{low}..{high}"
         mark = "" if is_verified(parameter) else " ?"
-        head = (f"{code}{mark}", parameter.name, number, wire, parameter.unit, f"{low}..{high}")
+        head = (f"{code}{mark}", parameter.name, number, wire, parameter.unit, limits)
         rows.append((*head, parameter.access, parameter.group))
     screen.print(table_of(PARAMETER_COLUMNS, rows))

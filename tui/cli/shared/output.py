@@ -176,7 +176,7 @@ def _cells(reading: Reading) -> tuple[str, ...]:
         reading.parameter.name,
         reading.text,
         reading.unit,
-        "" if reading.raw is None else str(reading.raw),
+        "" if reading.raw is None or reading.parameter.type == "ascii" else str(reading.raw),
         number,
         wire,
         _remark(reading),

@@ -11,7 +11,7 @@ from tui.drive.profile.profile import Profile
 
 from .identify import DriveIdentity, confirmed_identity
 from .identifying import Askable, ask_identification, intact
-from .register_reads import RegisterReads, unexpected_register
+from .register_reads import RegisterReads, families_by_registers, unexpected_register
 
 BRIEFLY = 0.4
 """Seconds within which a drive that has the function answers, although its family lacks it."""
@@ -56,8 +56,12 @@ async def own_words(line: Askable, device: int, profile: Profile) -> DriveIdenti
     if answer is not None:
         return await confirmed_identity(device, answer)
     reads = RegisterReads(line, device, Priority.OPERATOR_READ, None)
-    denied = await unexpected_register(reads, profile)
-    return DriveIdentity(device, "", "", "", "", None, (), denied) if denied else None
+    if denied := await unexpected_register(reads, profile):
+        return DriveIdentity(device, "", "", "", "", None, (), denied)
+    found = await families_by_registers(reads, "")
+    if not found or profile.id in found:
+        return None
+    return DriveIdentity(device, "", "", "", "", found[0] if len(found) == 1 else None, found)
 
 
 async def read_status(line: Askable, device: int, profile: Profile, priority: Priority) -> bool:
