@@ -264,6 +264,17 @@ async def test_two_profiles_with_the_same_registers_identify_no_drive(packaged: 
     assert identity.profile is None
 
 
+async def test_family_that_may_have_the_values_and_differs_in_nothing_is_named(
+    packaged: None,
+) -> None:
+    installed()
+    text = (mixer_text() + ROWS).replace(f'id = "{MIXER}"', 'id = "mixer-2"')
+    (library.user_folder() / "second.toml").write_text(text, encoding="utf-8")
+    result = checked(identified_by(BY_REGISTER))
+    assert "drives of mixer-2 may contain these values too" in result.output
+    assert (await identify_drive(FakeLine({1: WORDS}), 1)).profile is None
+
+
 async def test_reference_that_two_profiles_claim_identifies_no_drive(packaged: None) -> None:
     installed('reference_prefixes = ["ATV312"]')
     line = FakeLine({1: {}})
