@@ -63,6 +63,7 @@ async def test_guide_leads_from_the_table_to_a_motor_that_runs(tmp_path: Path) -
         ("code,name,max\nA,Ramp,inf\n", "max 'inf' is not a number"),
         (f"code,name\nA,{'x' * 200_000}\n", "t.csv:2: it is not a table"),
         ("code,name,function\nA,Ramp,5\n", "function '5' is not 3 or 4"),
+        ("code,name,mask\nA,Ramp,all\n", "mask 'all' is not a number"),
     ],
 )
 def test_table_with_a_mistake_is_refused_at_its_line(table: str, reason: str) -> None:
@@ -88,3 +89,16 @@ def test_table_of_a_spreadsheet_is_read(tmp_path: Path) -> None:
     table.write_bytes("code,name\nA,Modèle\n".encode("latin-1"))
     refused = ended(2, "profiles", "new", "own2", "--from-csv", table)
     assert "t.csv:2: byte 16#E8 is not UTF-8" in refused.output
+
+
+def test_pairs_and_parts_of_words_are_valid_from_the_first_moment(tmp_path: Path) -> None:
+    table = tmp_path / "t.csv"
+    table.write_text(
+        "code,name,number,address,type,shift,mask,access,quantity\n"
+        "STAT,Status,6,5,,,,r,status_word\nTRIP,Trip code,6.8,5,,8,16#FF,r,fault\n"
+        "H,Hours,9,8,uint32,,,r,run_hours\n",
+        encoding="utf-8",
+    )
+    ended(0, "profiles", "new", "pairs", "--from-csv", table)
+    assert library.faults_of(library.user_folder() / "pairs.toml") == []
+    assert library.load("pairs").parameters[1].shift == 8

@@ -40,7 +40,7 @@ def test_line_needs_a_file_to_prove() -> None:
 
 def test_file_that_is_not_the_profile_in_use_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "other.toml"
-    path.write_text(MS300.read_text("utf-8").replace('version = "0.1"', 'version = "0.2"'), "utf-8")
+    path.write_text(MS300.read_text("utf-8").replace('version = "', 'version = "9.'), "utf-8")
     output = refused(2, "profiles", "--prove", path, "--line", "serial:/dev/none", "--arm")
     assert "is not the profile ms300 that Drive Panel uses" in output
 

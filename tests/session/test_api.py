@@ -125,7 +125,9 @@ def test_drive_has_its_reported_identity(line: DriveLine) -> None:
 
 
 def test_drive_without_identification_needs_a_profile(line: DriveLine) -> None:
-    with pytest.raises(DriveError, match=r"name its profile: .*powerdrive"):
+    assert line.drive(3).profile == "powerdrive", "a simulated line names it"
+    line._calls._opened.profiles = {}
+    with pytest.raises(DriveError, match=r"Name its profile: .*powerdrive"):
         line.drive(3)
     assert line.drive(3, profile="powerdrive").profile == "powerdrive"
 

@@ -26,7 +26,7 @@ COLUMNS: Mapping[str, str] = {
     "offset": "offset", "min": "min", "minimum": "min", "max": "max", "maximum": "max",
     "factory": "factory", "default": "factory", "values": "values", "access": "access",
     "group": "group", "menu": "group", "storage": "storage", "quantity": "quantity",
-    "note": "note", "function": "function",
+    "note": "note", "function": "function", "mask": "mask", "shift": "shift",
 }  # fmt: skip
 """Field by heading, in small letters."""
 ACCESS: Mapping[str, str] = {
@@ -170,6 +170,7 @@ def _converted(row: dict[str, str]) -> dict[str, Any]:
         if function not in ("3", "4"):
             raise ValueError(f"{code}: function {function!r} is not 3 or 4.")
         found["function"] = int(function)
+    found |= {f: _field(code, f, row[f]) for f in ("mask", "shift") if f in row}
     found |= {f: row[f] for f in ("type", "unit") if f in row}
     found |= {f: row[f].replace(",", ".") for f in ("scale", "offset") if f in row}
     found |= {f: _counts(code, f, row, found) for f in IN_UNIT if f in row}
@@ -189,6 +190,14 @@ def _address(text: str) -> int | str:
     if match := re.fullmatch(r"(?:16#|0[xX])([0-9A-Fa-f]+)|([0-9A-Fa-f]+)[hH]", plain):
         return int(match[1] or match[2], 16)
     return text
+
+
+def _field(code: str, field: str, text: str) -> int:
+    """Return the mask or shift of a part of a word. Raises ValueError."""
+    number = _address(text)
+    if isinstance(number, int):
+        return number
+    raise ValueError(f"{code}: {field} {text!r} is not a number, such as 16#FF00 or 8.")
 
 
 def _counts(code: str, field: str, row: Mapping[str, str], found: Mapping[str, Any]) -> int:

@@ -91,12 +91,14 @@ class LineCalls:
         reported: DriveIdentity | None
         if profile is None:
             reported = identity = await identify_drive(line, address)
-            if identity.profile is None:
-                fits = ", ".join(identity.candidates) or "any"
+            known = identity.profile or self._opened.profiles.get(address)
+            if known is None:
+                fits = identity.candidates or [item.id for item in library.listings()]
                 raise DriveError(
-                    f"Device {address} does not identify itself; name its profile: {fits}."
+                    f"Device {address} does not identify itself. Name its profile:"
+                    f" {', '.join(fits)}."
                 )
-            found = library.load(identity.profile)
+            found = library.load(known)
         else:
             found = library.load(profile)
             reported = await own_words(line, address, found)

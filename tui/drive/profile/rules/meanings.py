@@ -11,6 +11,7 @@ from ..profile_frame import FrameError, frame_contents
 from ..reference_ways import QUANTITY_OF_KIND, reference_ways
 from ..schema import Parameter, ProfileData
 from ..toml_lines import TomlPath
+from .charts import RUN_ORDERS
 
 TIME_UNITS = ("s", "ms", "min")
 SPEED_UNITS = ("Hz", "rpm", "%")
@@ -103,7 +104,10 @@ def references_usable(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if feedback is not None and feedback.access == "w":
             at: TomlPath = ("references", index, "feedback")
             yield at, f"reference: its feedback {listed.feedback} cannot be read."
+    runs = any(order.id in RUN_ORDERS for chart in data.charts for order in chart.orders)
     for at, way, parameter in reference_ways(data):
+        if at[0] == "parameters" and not runs:
+            continue  # a profile that is begun
         place = (*at, "parameter" if at[0] == "references" else "code")
         if parameter.access == "r" or parameter.forbidden:
             yield place, f"reference {parameter.code} cannot be written."
