@@ -531,11 +531,13 @@ async def test_check_of_a_drive_has_its_state_or_its_error(
     reads: list[object] = []
     noted: list[object] = []
 
-    async def read(codes: list[str], **how: object) -> dict[str, str]:
+    fresh = SimpleNamespace(aged=lambda now, longest: "read")
+
+    async def read(codes: list[str], **how: object) -> dict[str, object]:
         reads.append((codes, how))
         if error is not None:
             raise error
-        return {"RFR": "read"}
+        return {"RFR": fresh}
 
     kept.reader = SimpleNamespace(read=read)
     kept.monitor.add_to_trend = noted.append

@@ -109,3 +109,17 @@ def test_rows_that_the_disk_refuses_are_written_later(
     with closing(RecordReader(file.path)) as reader:
         assert [item.word for item in reader.words(1, REGISTER, *EVER)] == [1, 2]
         assert sum(item.good for item in reader.reduced(1, REGISTER, *EVER)) == 2
+
+
+def test_clock_that_jumps_is_recorded_and_reported(tmp_path: Path) -> None:
+    reported: list[str] = []
+    file = RecordingFile(tmp_path / "values.sqlite", "serial:x", "record", reported.append)
+    ahead = [row_of(word, mono=word, wall=1000.0 + word) for word in (1, 2)]
+    file.add(ahead)
+    file.add([row_of(3, mono=3, wall=1000.0 + 3 - 3600)])
+    file.close()
+    assert reported == ["The computer's clock jumped by -3600.000 s."]
+    with closing(RecordReader(file.path)) as reader:
+        assert [item.word for item in reader.words(1, REGISTER, *EVER)] == [1, 2, 3]
+        (jump,) = [event.text for event in reader.events(*EVER) if event.kind == "clock"]
+    assert jump == reported[0]

@@ -122,6 +122,18 @@ def test_failed_read_fails_again_until_the_next_good_one(
         assert words(line) == (12,)
 
 
+def test_silent_drive_answers_no_request_but_its_last_values_are_known(tmp_path: Path) -> None:
+    lost = [row(at, address=200, registers=1, quality=2) for at in (2, 3, 4)]
+    path = record(tmp_path, row(1, (10,)), row(1.1, (20,), address=200), *lost, row(9, (0,)))
+    with replayed(path, 2.5) as line:
+        assert words(line) == (10,)
+        asyncio.run(line.run_to(BEGIN + 3.5))
+        with pytest.raises(NoAnswer):
+            words(line)
+        assert line.last_reply(1, 3, 200, 1).words == (20,)
+        assert line.counters.devices[1].timeouts == 1
+
+
 def test_refused_long_read_leaves_its_registers_readable(tmp_path: Path) -> None:
     refused = row(2, registers=2, quality=1, received=b"\x83\x02")
     path = record(tmp_path, row(1, (10,)), refused, row(9, (0,)))

@@ -229,4 +229,4 @@ async def test_trip_that_no_program_reported_is_an_event_to_go_to(tmp_path: Path
         (found,) = replay.events
         assert (found.utc, found.text) == (round((BEGIN + 40) * 1e6), "Tripped on OCF Overcurrent.")
         await made.pilot.press("#")
-        await made.until(lambda: abs(replay.clock.monotonic() - BEGIN - 38) < 0.5)
+        await made.until(lambda: abs(made.app.clock.monotonic() - BEGIN - 38) < 0.5)

@@ -75,7 +75,11 @@ class LineOwner(Panel):
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
-        line = await self._with_replayed(opened) if opened.replay else self._with_fleet(opened)
+        if opened.replay is not None:
+            only = opened.devices[0] if len(opened.devices) == 1 else None
+            line = await self._with_replayed(opened, only)
+        else:
+            line = self._with_fleet(opened)
         self.panel_lines = (*self.panel_lines, line)
         self.show_line(line)
         if opened.replay is not None:
@@ -99,10 +103,12 @@ class LineOwner(Panel):
         events = LineEvents(self.events, opened.label, lambda: self.opened is opened)
         return PanelLine(opened, Fleet(opened.line, self.journal, starts, events, self.panel_clock))
 
-    async def _with_replayed(self, opened: OpenLine, device: int | None = None) -> PanelLine:
+    async def _with_replayed(
+        self, opened: OpenLine, device: int | None, *, goes_on: bool = True
+    ) -> PanelLine:
         """Return a replay with its drives at its time; messages in it are not those of the panel.
 
-        The curve of the drive `device` begins before that time.
+        The drive `device` was monitored before that time; if it `goes_on`, it still is.
         """
         from tui.session.events import EventLog
         from tui.session.fleet import Fleet
@@ -121,9 +127,7 @@ class LineOwner(Panel):
             beside = codes_beside(console.session.profile)
             console.monitor.start(period=self.period, extra=beside)
 
-        if device is None and len(fleet.consoles) == 1:
-            device = fleet.consoles[0].device
-        await pass_lead(replay, fleet, device, monitor, self.period)
+        await pass_lead(replay, fleet, device, monitor, self.period, goes_on=goes_on)
         self.run_worker(
             asyncio.to_thread(add_trips, replay, device), group="trips", exit_on_error=False
         )

@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from tui.session.record.replay_line import ReplayLine
 
 NO_REPLAY = "This key is for a replay. To open one, end the panel and run: drivepanel replay FILE"
-NEAR = 60.0
-"""Seconds up to which a replay goes forward as it is, without beginning again before that time."""
 EVENT_LEAD = 2.0
 """Seconds before an event at which a jump to it ends."""
 
@@ -116,23 +114,13 @@ class ReplayKeys(StatusRefresher, LineOwner, Places):
         self._is_moving = True
         try:
             while (at := self._wanted) is not None and (replay := self.replay) is not None:
-                if 0.0 <= at - replay.clock.monotonic() <= NEAR:
-                    await self._go_on(replay, at)
-                else:
-                    await self._begin_again(replay, at)
+                await self._begin_again(replay, at)
                 self._wanted = self._wanted if self._wanted != at else None
                 self._show_moved()
         except LineError as error:
             self.notify(str(error), severity="error")
         finally:
             self._is_moving, self._wanted = False, None
-
-    async def _go_on(self, replay: ReplayLine, at: float) -> None:
-        playing = replay.clock.playing
-        replay.clock.hold()
-        await replay.run_to(at)
-        if playing:
-            replay.clock.play()
 
     async def _begin_again(self, replay: ReplayLine, at: float) -> None:
         """Open the record again at another time, and show the same screen on it."""
@@ -149,7 +137,8 @@ class ReplayKeys(StatusRefresher, LineOwner, Places):
         opened.replay.clock.set_speed(replay.clock.speed)
         playing = replay.clock.playing
         try:
-            line = await self._with_replayed(opened, device)
+            opened.replay.events = replay.events  # with the trips that were sought
+            line = await self._with_replayed(opened, device, goes_on=place != CONNECTION)
         except BaseException:
             opened.close()
             raise
@@ -157,7 +146,9 @@ class ReplayKeys(StatusRefresher, LineOwner, Places):
         if playing:
             opened.replay.clock.play()
         console = line.fleet.console(device) if device is not None else None
-        if console is not None and place != CONNECTION:
+        if console is not None and place == CONNECTION:
+            self._choose(console)
+        elif console is not None:
             self.show_monitor(console)
             if place != MONITOR:
                 self.show_place(place, console)

@@ -16,32 +16,41 @@ from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.bus.model import LineStatus
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
-from tui.drive.profile.profile import Profile, digest_of
-from tui.drive.values import from_words, is_signed_type, word_count
+from tui.drive.profile.profile import digest_of
+from tui.drive.values import from_words, word_count
 
 from .connect.identify import DriveIdentity, identity_from
 from .console import DriveConsole
 from .drive import DriveSession
 from .fleet import Fleet
 from .journal import Entry, Journal
+from .monitor.fault_record import SECONDS_KEPT
+from .monitor.line_watch import GLANCE
+from .monitor.monitor import codes_of_state
 from .reading import Origin, Reading
+from .record.newest import ends_of_cycles
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from .record.runs import history_of, read_events
-from .record.schema import EventRow
+from .record.schema import EventRow, to_microseconds
+from .replay_past import means_of, past_times, recall_past
 
-EXACT_LEAD = 60.0
-"""Seconds before the time of a replay that pass as they were."""
-MONITORED_IN_LEAD = 4
-"""Drives whose curves begin before the time of a replay, if none is open."""
-LEAD_TAKES, EXACT_TAKES = 0.25, 1.5
-"""Seconds of processor time for both; a line with many drives then has gaps in its curves."""
-LEAD_SLEEP = 5.0
-"""Seconds of each sleep in those before; more with many drives."""
+TRIPS_OF = 4
+"""Drives whose trips are events of a replay, if none is open."""
+EXACT_TAKES = 1.5
+"""Seconds of processor time for them; on a slow computer, the curve then has a gap."""
 OTHER_PROFILE = (
     "Drive {device}: profile {profile} has changed since the record was made. Values may be shown"
     " differently."
 )
 NO_PROFILE = "Drive {device}: {error} Its values are not shown."
+STEP_MARGIN = 0.03
+"""Seconds from the end of a recorded cycle to that of the replay: the recorded ones vary."""
+MOST_SOUGHT = 500
+"""Replies in which they are sought."""
+SOUGHT_PAUSES = 5
+"""Periods before the time of a replay in which its cycles are sought."""
+LONGER_THAN_LEAD = 1000.0
+"""Seconds between the checks of drives before a replay begins: samples replace them."""
 SAME_TRIP_WITHIN = 5_000_000
 """Microseconds between a trip and the event by which a program reported it."""
 EVER = 4e9
@@ -84,6 +93,7 @@ def take_drives(line: ReplayLine, fleet: Fleet) -> list[str]:
     It reads files, in the caller's thread.
     """
     reported = []
+    fleet.line_watch.least_period = LONGER_THAN_LEAD
     for device in line.devices:
         named = named_profile(line, device)
         identity = _identity(line, device, named)
@@ -97,10 +107,11 @@ def take_drives(line: ReplayLine, fleet: Fleet) -> list[str]:
             fleet.note(identity)
             reported.append(NO_PROFILE.format(device=device, error=error))
             continue
-        line.use_means(device, _means(profile).get)
+        line.use_means(device, means_of(profile).get)
         session = DriveSession(line, device, profile, identity, line.clock)
         session.arming.barred = REPLAY_SENDS_NOTHING
-        fleet.take(session)
+        # reads cost nothing here: a slow value is shown as soon as it was read then
+        fleet.take(session).monitor.slow_factor = 1
         if named.hash and named.hash != digest_of(profile):
             reported.append(OTHER_PROFILE.format(device=device, profile=id))
     return reported
@@ -116,24 +127,13 @@ def _identity(line: ReplayLine, device: int, named: NamedProfile) -> DriveIdenti
     return DriveIdentity(device, "", named.reference, named.version, "", known, candidates)
 
 
-def _means(profile: Profile) -> dict[tuple[int, int], bool]:
-    """Return the registers that hold a quantity, with True for the signed ones."""
-    found: dict[tuple[int, int], bool] = {}
-    for parameter in profile.data.parameters:
-        is_number = bool(parameter.unit) and not parameter.bits and not profile.names(parameter)
-        if is_number and word_count(parameter) == 1:
-            signed = is_signed_type(parameter)
-            found[parameter.function, parameter.address] = signed
-    return found
-
-
 def add_trips(line: ReplayLine, device: int | None) -> None:
     """Add the trips of `device` that only the words of the record show to its events.
 
     Without a device, those of some drives. It reads files for a second a drive and day: in a thread
     that nobody waits for.
     """
-    for each in line.devices[:MONITORED_IN_LEAD] if device is None else (device,):
+    for each in line.devices[:TRIPS_OF] if device is None else (device,):
         if line.state.status is LineStatus.CLOSED:
             return
         trips = _trips_of(tuple(line.files), each, named_profile(line, each).id)
@@ -165,10 +165,29 @@ def _take_known(line: ReplayLine, session: DriveSession) -> None:
     for parameter in session.profile.data.parameters:
         place = parameter.function, parameter.address, word_count(parameter)
         with suppress(LineError):
-            reply = line.newest_reply(session.device, *place)
+            reply = line.last_reply(session.device, *place)
             raw = from_words(parameter, reply.words)
             found[parameter.code] = Reading.undecoded(parameter, raw, reply.time, Origin.POLL)
     session.take(found)
+
+
+def _trips_in_lead(line: ReplayLine, device: int | None) -> bool:
+    """Return True if a drive trips shortly before the replay: Faults shows its values then."""
+    span = range(to_microseconds(line.clock.monotonic()), to_microseconds(line.at) + 1)
+    return any(e.kind == "fault" and e.device == device and e.utc in span for e in line.events)
+
+
+def in_step(line: ReplayLine, device: int | None, since: float, period: float) -> float:
+    """Return a time from `since` on at which cycles of a period end as the recorded ones do.
+
+    `since` itself if the reads of a device have no pauses before the time of the replay.
+    """
+    if device is None:
+        return since
+    replies = line.last_before(device, line.at - SOUGHT_PAUSES * period, line.at, MOST_SOUGHT)
+    if not (ends := ends_of_cycles(replies[::-1], line.at)):
+        return since
+    return since + (ends[-1] + STEP_MARGIN - since) % period
 
 
 async def pass_lead(
@@ -177,28 +196,34 @@ async def pass_lead(
     device: int | None,
     monitor: Callable[[DriveConsole], None],
     period: float,
+    *,
+    goes_on: bool = True,
 ) -> None:
-    """Go from the lead to the time of the replay, with all that happened on the way.
+    """Go to the time of the replay: with the seconds before it of the drive `device`.
 
-    `monitor` starts the monitor of the drive `device`; without one, of some drives for a while.
+    `monitor` starts its monitor, which `goes_on` then. Of the other drives, samples of the record
+    are enough.
     """
-    clock, drives = line.clock, fleet.consoles
-    exact = line.in_step(device, max(clock.monotonic(), line.at - EXACT_LEAD), period)
-    if clock.monotonic() < exact:
-        clock.least_sleep = max(LEAD_SLEEP, float(len(drives)))
-        await line.run_to(exact, LEAD_TAKES)
-        clock.least_sleep = 0.0
+    clock, drives, watch = line.clock, fleet.consoles, fleet.line_watch
+    shown = fleet.console(device) if device is not None else None
+    for console in drives:
+        monitored = clock.monotonic() if console is shown else line.at
+        events = [e.utc / 1e6 for e in line.events if e.device == console.device]
+        times = past_times(clock.begin, line.at, events)
+        await asyncio.to_thread(recall_past, line, console, watch, times, monitored)
+    if shown is not None:
+        if not _trips_in_lead(line, device):
+            await line.run_to(in_step(line, device, clock.monotonic(), period))
+            shown.monitor.start(codes_of_state(shown.session.profile), period)  # its curve
+            watch.keep(shown.session, shown.monitor)
+            await line.run_to(max(clock.monotonic(), line.at - SECONDS_KEPT), EXACT_TAKES)
+        await line.run_to(in_step(line, device, clock.monotonic(), period))
+        monitor(shown)
+        watch.keep(shown.session, shown.monitor)
+    await line.run_to(line.at, EXACT_TAKES)
+    watch.least_period = GLANCE
+    if shown is not None and not goes_on:
+        shown.monitor.stop()
     for console in drives:
         await asyncio.to_thread(_take_known, line, console.session)
-    shown = [console for console in drives if device in (None, console.device)]
-    for console in shown[:MONITORED_IN_LEAD]:
-        monitor(console)
-    await line.run_to(line.at, EXACT_TAKES)
-    for console in shown[:MONITORED_IN_LEAD]:
-        if device is None:
-            console.monitor.stop()
-        else:
-            monitor(console)  # reads all values of this time, also those of the slow rate
-    for console in drives:  # what was not read at the begin may have been read since
-        await asyncio.to_thread(_take_known, line, console.session)
-        fleet.line_watch.keep(console.session, console.monitor)
+        watch.keep(console.session, console.monitor)  # checks it at this time

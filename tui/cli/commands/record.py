@@ -8,6 +8,7 @@ import time
 from collections.abc import Coroutine, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -267,7 +268,9 @@ class Recording:
         chosen = [[item.profile.find(code).code for code in wish.codes] for item in sessions]
         try:
             wish.path.unlink(missing_ok=True)
-            self.file = RecordingFile(wish.path, label(opened.line.link), opened.line.facts.me.text)
+            program = opened.line.facts.me.text
+            report = partial(say, err=True)
+            self.file = RecordingFile(wish.path, label(opened.line.link), program, report)
         except OSError as error:
             raise Failure(f"{wish.path}: {error.strerror or error}.", USAGE) from None
         with closing(self.file):

@@ -137,6 +137,10 @@ class MonitorScreen(CursorKeys):
         """Disarm the drive and stop monitoring it: its state is no longer visible."""
         self.session.arming.disarm()
         self.console.monitor.stop()
+        fleet = self.app.fleet if self.app.replay is not None else None
+        if fleet is not None and fleet.console(self.session.device) is self.console:
+            # its check is due now: the time of a replay may be held
+            fleet.line_watch.keep(self.session, self.console.monitor)
 
     def on_resize(self, event: Resize) -> None:
         """Size the parts for the new terminal size."""
@@ -279,15 +283,12 @@ class ViewSource:
     def __init__(self, app: Panel, console: DriveConsole) -> None:
         self._app = app
         self._console = console
-        self._was = ""
 
     def view(self, control: Control, word: int | None, cursor: TimeCursor) -> View:
         """Return the present contents; `word` is the index of a table, None for the curve."""
         app, console, session = self._app, self._console, self._console.session
         now, monitor, fleet = app.clock.monotonic(), console.monitor, app.fleet
         snapshot = monitor.latest
-        if snapshot is not None and not snapshot.error and snapshot.state.kind != "unknown":
-            self._was = snapshot.state.headline
         return View(
             profile=session.profile,
             snapshot=snapshot,
@@ -305,7 +306,7 @@ class ViewSource:
             heard=session.line.device_state(session.device).heard,
             control=control,
             stop=self._stop(now),
-            was=self._was,
+            was=monitor.was,
             step=cursor.step,
             apart=app.clock.wall_of(0.0),
             page=cursor.page,

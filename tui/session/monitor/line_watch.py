@@ -94,6 +94,8 @@ GLANCE_EACH = 0.15
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's timeout and reaction are read again: someone may change them."""
 SHORTEST = 0.02
+OLDEST = 12.0
+"""Age of a value in seconds, above which it shows no state; only a replay has such values."""
 EARLY = 0.25
 """Seconds after which a check follows a request to read the whole drive, at most."""
 
@@ -119,6 +121,8 @@ class LineWatch:
         """Held while a drive is added or removed, and while its keep-alive read changes."""
         self._looks: dict[int, Look] = {}
         self.onsets = FaultOnsets()
+        self.least_period = GLANCE
+        """Least seconds between two checks of a drive without a running monitor."""
 
     @property
     def looks(self) -> Mapping[int, Look]:
@@ -225,8 +229,10 @@ class LineWatch:
         device = session.device
         kept = _Kept(session, monitor, Reader(session), session.clock.monotonic())
         with self._changing:
-            if device in self._kept:
-                self._let_go(self._kept[device])
+            if (before := self._kept.get(device)) is not None:
+                self._let_go(before)
+                if before.session is session:
+                    kept.watch, kept.learned = before.watch, before.learned
             self._kept = {**self._kept, device: kept}
             # before the timeout is known, too: reads of missing words may take seconds
             self._keep_alive(kept, UNKNOWN_TIMEOUT)
@@ -236,6 +242,12 @@ class LineWatch:
             self._line.spawn(learn, f"learner {device}"),
             self._line.spawn(glance, f"line_watch {device}"),
         )
+
+    def recall(self, device: int, look: Look) -> None:
+        """Take a check of a record, as the last one of a drive."""
+        if look.state is not None:
+            self.onsets.note(device, look.state, look.time)
+        self._looks = {**self._looks, device: look}
 
     def stop(self) -> None:
         """Stop all checks and keep-alive reads."""
@@ -280,7 +292,7 @@ class LineWatch:
             rest = max(SHORTEST, rest)
             requested = kept.session.full_reads_requested
             while rest > 0 and not (early and kept.session.full_reads_requested != requested):
-                part = min(rest, EARLY) if early else rest
+                part = min(rest, EARLY) if early and self.least_period == GLANCE else rest
                 await kept.session.clock.sleep(part)
                 rest -= part
 
@@ -292,6 +304,7 @@ class LineWatch:
     async def _glance(self, kept: _Kept) -> float:
         """Read a drive's state, unless its monitor is running; return seconds to the next call."""
         if kept.monitor.running:
+            self._take_monitored(kept)
             return GLANCE / 10
         profile, device = kept.session.profile, kept.session.device
         state, error, readings = None, "", {}
@@ -305,6 +318,8 @@ class LineWatch:
             settings = {
                 c: reading for c in reported if (reading := kept.session.image.get(c)) is not None
             }
+            now = kept.session.clock.monotonic()
+            readings = {code: item.aged(now, OLDEST) for code, item in readings.items()}
             state = drive_state(profile, settings | readings)
             self.onsets.note(device, state, kept.session.clock.wall())
         except LineError as fault:
@@ -319,13 +334,24 @@ class LineWatch:
             kept.monitor.add_to_trend(look)
         return self.glance_period if kept.learned is not None else GLANCE / 10
 
+    def _take_monitored(self, kept: _Kept) -> None:
+        """Take the last values of a monitor as a check: it may be the last one with a reply."""
+        latest, device = kept.monitor.latest, kept.session.device
+        if latest is None or latest.error or latest.state.kind == "unknown":
+            return
+        watch = self._watch(kept)
+        timeout = watch.timeout if watch is not None and watch.active else None
+        look = Look(latest.state, "", latest.time, timeout, latest.readings)
+        if self._kept.get(device) is kept:
+            self._looks = {**self._looks, device: look}
+
     @property
     def glance_period(self) -> float:
         """Seconds between two checks of a drive.
 
         Longer if many drives share the line, so that the checks do not load it.
         """
-        return max(GLANCE, GLANCE_EACH * len(self._kept))
+        return max(self.least_period, GLANCE_EACH * len(self._kept))
 
     async def _learn(self, kept: _Kept) -> float:
         """Check the byte order, then read the drive's timeout and its reaction."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -69,6 +69,8 @@ class Monitor:
         self.profile = session.profile
         self.period = 0.5
         """Target cycle time in seconds; a change applies from the next cycle on."""
+        self.slow_factor = SLOW_FACTOR
+        """Number of cycles in which each slow value is read once; set before `start`."""
         self.pause_reason: Callable[[], str] = lambda: ""
         """Returns why the drive must not be polled now; empty to poll it.
 
@@ -84,6 +86,8 @@ class Monitor:
         self._using = ""
         self._kind = "unknown"
         """Kind of the last state read."""
+        self.was = ""
+        """Headline of the last known state; empty before the first."""
         self._all_due = True
         self._full_reads_done = 0
         self._learn_due = True
@@ -115,6 +119,10 @@ class Monitor:
         """Add a cycle, or a check between the cycles, to the trend. In the line's thread."""
         self._notes.ask()
         self._notes.add(self._trend.add(cycle))
+
+    def recall(self, points: Iterable[TrendPoint]) -> None:
+        """Insert points of a record into the trend; not while a worker adds to it."""
+        self._trend.join(points)
 
     @property
     def running(self) -> bool:
@@ -195,7 +203,7 @@ class Monitor:
             return
         self._notes.ask()
         self.session.note_profile()  # with the scales that were learned since
-        rates = self._started or Rates(_codes_of_state(self.profile))
+        rates = self._started or Rates(codes_of_state(self.profile))
         rates = rates.with_fast([code for codes in self._also for code in codes])
         self._worker = self.line.spawn(
             lambda: self._keep_watching(rates), f"monitor {self.profile.id} {self.device}"
@@ -234,7 +242,7 @@ class Monitor:
     async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
         begun: deque[float] = deque(maxlen=RATE_OVER)
-        due = Rotation(SLOW_FACTOR)
+        due = Rotation(self.slow_factor)
         self._all_due = True
         cycle = failures = 0
         try:
@@ -295,7 +303,7 @@ class Monitor:
     def _period(self, rates: Rates) -> float:
         """Return the target cycle time in seconds; longer if the line cannot keep it for all."""
         cost = self.reader.seconds(rates.fast)
-        cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
+        cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR  # in a replay, too: as it was
         return self.line.pace.claim(self, self.device, cost, max(self.period, SHORTEST_PERIOD))
 
     def _may_be_another(self, fault: Exception, failures: int) -> bool:
@@ -361,6 +369,8 @@ class Monitor:
         if not error and snapshot.state.kind != self._kind:
             self._kind = snapshot.state.kind
             self.reader.compare_soon()
+        if not error and snapshot.state.kind != "unknown":
+            self.was = snapshot.state.headline
         if snapshot.state.kind in RESET_NEAR:
             self.reader.distrust()
         self._latest = snapshot
@@ -368,7 +378,7 @@ class Monitor:
         self._hand_out(snapshot)
 
 
-def _codes_of_state(profile: Profile) -> tuple[str, ...]:
+def codes_of_state(profile: Profile) -> tuple[str, ...]:
     """Return the codes of the drive's state, its fault, and the values of its trend."""
     found = (readout_parameter(profile, quantity) for quantity in TREND_QUANTITIES)
     codes = [*watched_codes(profile), profile.data.faults.parameter]

@@ -16,8 +16,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.sentences import all_of
 from tui.simulator.ghost import GhostDrive, RecordedExchange
 
-from .newest import ReplayReader
 from .reader import ROWS_AT_A_TIME
+from .replay_reader import ReplayReader
 from .schema import GOOD, REFUSED, SILENT, RecordDamaged, ReplyRow
 
 DAMAGED, WRONG = 3, 4

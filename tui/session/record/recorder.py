@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from tui.bus.ended_exchange import EndedExchange
 from tui.drive.sentences import counted
 
-from .reduction import CLOCK_JUMP
+from .clock_jumps import ClockJumps
 from .ring import (
     DAMAGED_MARK,
     MOST_RECORDED,
@@ -108,7 +108,7 @@ class LineRecorder:
         self._files: dict[Path, RecordFile] = {}
         self._standing: dict[tuple[str, int | None], EventRow] = {}
         """The last events that each file begins with, by kind and device."""
-        self._offset: int | None = None
+        self._jumps = ClockJumps(self._tell)
         self._why = ""
         self._retry_at = self._failed = self._failing_since = 0.0
         self._reported = False
@@ -224,7 +224,7 @@ class LineRecorder:
                 count = min(len(self._waiting), WRITTEN_AT_A_TIME)
                 items = [self._waiting.popleft() for _ in range(count)]
                 rows = [row for item in items for row in self._rows(item)]
-                self._batch = [*self._jumps(rows)]
+                self._batch = self._jumps.noted(rows)
             day, rows_of_day = next(itertools.groupby(self._batch, _day))
             part = list(rows_of_day)
             self._file(day).write(
@@ -245,19 +245,6 @@ class LineRecorder:
         if isinstance(item, EventRow) and item.kind in STANDING_EVENTS:
             self._standing[item.kind, item.device] = item
         return (item,)
-
-    def _jumps(self, rows: Sequence[ReplyRow | EventRow]) -> Sequence[ReplyRow | EventRow]:
-        """The rows, and an event before each that follows a jump of the time of day."""
-        found: list[ReplyRow | EventRow] = []
-        for row in rows:
-            offset, before = row.utc - row.mono, self._offset
-            self._offset = offset
-            if before is not None and abs(offset - before) > CLOCK_JUMP:
-                text = f"The computer's clock jumped by {(offset - before) / 1e6:+.3f} s."
-                found.append(EventRow(row.utc, row.mono, None, "clock", text))
-                self._tell(text)
-            found.append(row)
-        return found
 
     def _file(self, day: int) -> RecordFile:
         path = record_path(self._folder, self._name, day)

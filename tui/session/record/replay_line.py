@@ -6,10 +6,10 @@ import asyncio
 import math
 import sqlite3
 import threading
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine, Iterator, Sequence
 from concurrent.futures import Future
-from contextlib import suppress
-from itertools import pairwise
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -40,24 +40,22 @@ from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
 from tui.bus.trace import Frame
 
-from .newest import MeanOf, NewestReplies, RecordedReply, ReplayReader
+from .newest import NewestReplies, count_recorded
 from .reader import MOST_FILES
 from .rebuilt_frames import frames_of
 from .replay_clock import ReplayClock
+from .replay_reader import MeanOf, RecordedReply, ReplayReader
 from .replay_wire import replayed_link, wire_frame
-from .schema import COPY, GOOD, REFUSED, SILENT, EventRow, RecordDamaged, to_microseconds
+from .schema import EventRow, RecordDamaged, to_microseconds
 
 T = TypeVar("T")
 
 REPLAY_SENDS_NOTHING = "This is a replay: nothing is sent to a drive."
+COUNTED_EVERY = 1.0
+SILENT_AFTER = 2
+"""Failed requests in a row after which any other one would have failed, too."""
 FRAMES_OF = 10.0
 """Seconds of the record whose frames are listed."""
-PAUSE_OF_CYCLES = 0.1
-"""Seconds without a request that end a cycle of a monitor."""
-STEP_MARGIN = 0.03
-"""Seconds from the end of a recorded cycle to that of the replay: the recorded ones vary."""
-SOUGHT_PAUSES = 5
-"""Periods before the time of a replay in which its cycles are sought."""
 STARTS_WITHIN = 10.0
 """Seconds within which the thread of a line starts and ends."""
 _EVENTS = ("fault", "stop", "done", "failed", "alarm", "trigger", "notice", "commander")
@@ -130,40 +128,31 @@ class ReplayLine:
 
     def identification(self, device: int, function: int) -> IdentificationObjects | None:
         """Return what a device reported by a function; None if it is not recorded."""
-        try:
-            with self._lock:
-                return self._reader.identification(device, function)
-        except sqlite3.Error as error:
-            raise LineFailed(f"The record cannot be read: {error}.") from error
+        with self._reading():
+            return self._reader.identification(device, function)
 
-    def in_step(self, device: int | None, since: float, period: float) -> float:
-        """Return a time from `since` on at which cycles of a period end as the recorded ones do.
-
-        `since` itself if the reads of a device have no pauses before the time of the replay.
-        """
-        if device is None:
-            return since
-        last = max(since, self.at - SOUGHT_PAUSES * period)
-        with self._lock:
-            replies = self._reader.replies_from(device, to_microseconds(last))
-        ends = [
-            reply.ended / 1e6
-            for reply, following in pairwise(replies)
-            if following.sent - reply.ended > PAUSE_OF_CYCLES * 1e6
-        ]
-        ends = [end for end in ends if end <= self.at]
-        if not ends:
-            return since
-        return since + (ends[-1] + STEP_MARGIN - since) % period
-
-    def newest_reply(self, device: int, function: int, address: int, count: int) -> Reply:
-        """Return the registers as they were read last; raises the recorded error."""
-        try:
-            with self._lock:
-                words, ended = self._of(device).words(function, address, count)
-        except sqlite3.Error as error:
-            raise LineFailed(f"The record cannot be read: {error}.") from error
+    def last_reply(self, device: int, function: int, address: int, count: int) -> Reply:
+        """Return the registers as they were read last, whatever has failed since."""
+        with self._reading():
+            words, ended = self._of(device).last_words(function, address, count)
         return Reply(words, ended / 1e6)
+
+    @contextmanager
+    def _reading(self) -> Iterator[None]:
+        try:
+            with self._lock:
+                yield
+        except sqlite3.Error as error:
+            raise LineFailed(f"The record cannot be read: {error}.") from error
+
+    def last_before(self, device: int, since: float, at: float, most: int) -> list[RecordedReply]:
+        """Return the last replies of a device in a time of the record, the newest first."""
+        span = to_microseconds(since), to_microseconds(at)
+        try:
+            with self._lock:
+                return self._reader.last_before(device, *span, most)
+        except sqlite3.Error:
+            return []
 
     def use_means(self, device: int, mean_of: MeanOf) -> None:
         """Set which registers of a device have a mean, for replies that were reduced."""
@@ -174,29 +163,11 @@ class ReplayLine:
         """The newest replies of a device, at the present time; with the lock."""
         if device not in self._newest:
             self._newest[device] = NewestReplies(
-                self._reader, device, lambda reply: self._count(device, reply)
+                self._reader, device, partial(count_recorded, self._tally, device)
             )
         newest = self._newest[device]
         newest.move(to_microseconds(self.clock.monotonic()))
         return newest
-
-    def _count(self, device: int, reply: RecordedReply) -> None:
-        """Count an exchange of the record, as the line counted it then."""
-        if reply.quality > COPY:
-            return
-        tally = self._tally
-        tally.count_sent(device, 0)
-        tally.count_end(device, (reply.ended - reply.sent) / 1e6, 0)
-        if reply.quality in (GOOD, REFUSED, COPY):
-            tally.count_reply(device, (reply.ended - reply.sent) / 1e6)
-            tally.count_good(device, was_heard=True)
-            if reply.quality == REFUSED:
-                tally.count_exception(device, reply.received[1] if reply.received else 0)
-        elif reply.quality == SILENT:
-            tally.count_silence(device, searched=False)
-        else:
-            tally.count_checksum(device)
-            tally.count_minute(device, "damaged")
 
     # A line
 
@@ -234,9 +205,17 @@ class ReplayLine:
             self._frames = now, tuple(item for item in found if item.time <= now)
         return self._frames[1]
 
+    def _count_all(self) -> None:
+        """Count what has ended by now."""
+        with suppress(sqlite3.Error), self._lock:
+            for device in self.devices:
+                self._of(device)
+
     @property
     def counters(self) -> LineCounters:
         """Counts of the exchanges that were replayed."""
+        if not self._closed:
+            self._count_all()
         return self._tally.frozen()
 
     def open(self, *, wait: float | None = None) -> None:
@@ -257,14 +236,21 @@ class ReplayLine:
             loop.close()
 
     async def _work(self) -> None:
-        follower = asyncio.ensure_future(self.clock.follow())
-        self._workers.add(follower)
+        self._workers |= {
+            asyncio.ensure_future(work) for work in (self.clock.follow(), self._count())
+        }
         while not self._closed or self._workers:
             await asyncio.wait(self._workers, timeout=0.05)
             self._workers = {task for task in self._workers if not task.done()}
             if self._closed:
                 for task in self._workers:
                     task.cancel()
+
+    async def _count(self) -> None:
+        """Count what ends, at its time."""
+        while True:
+            self._count_all()
+            await self.clock.sleep(COUNTED_EVERY)
 
     def close(self) -> None:
         """Close the line; may be called twice."""
@@ -304,7 +290,12 @@ class ReplayLine:
     ) -> Reply:
         """Return the registers as they were read last; raises the recorded error."""
         self._check()
-        return self.newest_reply(device, function, address, count)
+        with self._reading():
+            newest = self._of(device)
+            if newest.last_failure is not None and newest.failures >= SILENT_AFTER:
+                raise newest.last_failure.error(device)  # as another request to it would have
+            words, ended = newest.words(function, address, count)
+        return Reply(words, ended / 1e6)
 
     def _check(self) -> None:
         if self._closed:

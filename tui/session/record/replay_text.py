@@ -14,7 +14,7 @@ from .replay_line import ReplayLine
 from .ring import DAMAGED_MARK, files_of_line
 from .schema import RecordDamaged
 
-REPLAY_LEAD = 600.0
+REPLAY_LEAD = 60.0
 """Seconds before the time of a replay that pass quickly, for curves and counts."""
 _AT = ",at="
 _TIMES = ("%H:%M", "%H:%M:%S", "%H:%M:%S.%f")

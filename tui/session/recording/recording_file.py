@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import closing, suppress
 from functools import partial
@@ -15,6 +15,7 @@ from tui.drive.profile.profile import digest_of
 from tui.drive.values import to_words, word_count
 
 from ..reading import Reading
+from ..record.clock_jumps import ClockJumps
 from ..record.schema import GOOD, REFUSED, SILENT, EventRow, ReplyRow, to_microseconds
 from ..shown import Quality
 
@@ -109,14 +110,17 @@ class RecordingFile:
     For one thread. Rows that the disk refuses are written later, with the next ones.
     """
 
-    def __init__(self, path: Path, line: str, program: str) -> None:
-        """Create the file. Raises OSError."""
+    def __init__(
+        self, path: Path, line: str, program: str, report: Callable[[str], object] = len
+    ) -> None:
+        """Create the file; `report` gets a text for each jump of the clock. Raises OSError."""
         self.path = path
         self.written = self.lost = 0
         """Numbers of rows of values."""
         self.trouble = ""
         """Why the last rows were not written; empty if they were."""
         self._create = partial(_created, path, line, program)
+        self._jumps = ClockJumps(report)
         self._waiting: list[RecordingRow] = []
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="recording")
         self._writing: Future[list[RecordingRow]] | None = None
@@ -128,7 +132,7 @@ class RecordingFile:
 
     def add(self, rows: Sequence[RecordingRow]) -> None:
         """Add rows, which `write` writes."""
-        self._waiting += rows
+        self._waiting += self._jumps.noted(rows)
         if (excess := len(self._waiting) - ROWS_KEPT) > 0:
             del self._waiting[:excess]
             self.lost += excess
