@@ -2,14 +2,27 @@
 
 from __future__ import annotations
 
+import time
+from datetime import datetime
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Literal
 
 import pytest
 from textual.screen import ModalScreen
 
+from tui.bus.fake import FakeLine
+from tui.drive.profile import library
 from tui.screens.dialogs.ask import Ask
 from tui.screens.parameters.edit_value import EditNumber, PickValue
+from tui.screens.startup.run_rows import RunRows
 from tui.screens.startup.screen import StartUpScreen
+from tui.session.clock import REAL_CLOCK
+from tui.session.drive import DriveSession
+from tui.session.journal import Entry, Journal
+from tui.session.monitor.trend import TrendPoint
+from tui.session.startup.judging import StepRow
 from tui.session.startup.start_up import StartUp
 
 from .test_command_flows import Bench, bench, writes
@@ -81,6 +94,64 @@ async def test_number_of_the_nameplate_is_proposed_and_only_staged() -> None:
         await made.pilot.press("enter")
         await until(made.pilot, lambda: "Not done" in shown(made.app, "said"))
         assert writes(made.app) == []
+
+
+def recorded(journal: Journal, row: StepRow, points: list[TrendPoint]) -> tuple[str, str]:
+    """What Enter on a row records, and what it tells otherwise."""
+    entries: list[str] = []
+    texts: list[str] = []
+    session = DriveSession(FakeLine(), 1, library.load("atv71"))
+    rows: Any = SimpleNamespace(
+        app=SimpleNamespace(clock=REAL_CLOCK, tell=texts.append, action_goto=lambda _: None),
+        console=SimpleNamespace(journal=journal, monitor=SimpleNamespace(trend=points)),
+        session=session, _enter=lambda row, key, text: entries.append(text),
+        _clock_text=lambda moment: "12:00:00", _has_no_frequency=False,
+        _go_and_run=lambda *_: None,
+    )  # fmt: skip
+    rows._other_method = partial(RunRows._other_method, rows)
+    record = SimpleNamespace(entries={})
+    step = SimpleNamespace(hz=[], rated="")
+    start_up: Any = SimpleNamespace(
+        since=time.monotonic() - 60, chosen=row, record=record, step=step
+    )
+    if row.kind == "test":
+        RunRows._record_test(rows, start_up)
+    else:
+        RunRows._record_run(rows, start_up, row)
+    return " ".join(entries), " ".join(texts)
+
+
+def entry_of(why: str, kind: Literal["write", "proof"], ago: float = 1.0) -> Entry:
+    """An entry of the journal about drive 1."""
+    text = datetime.fromtimestamp(time.time() - ago).astimezone().isoformat()
+    line = DriveSession(FakeLine(), 1, library.load("atv71")).line_text
+    return Entry(
+        text, line, 1, "atv71", "CMD", 8501, None, "", 7, "tested", "as set", None, why, kind=kind
+    )
+
+
+def test_newest_communication_loss_test_is_recorded(tmp_path: Path) -> None:
+    journal, row = Journal(tmp_path), StepRow("test", "Test")
+    assert "press P" in recorded(journal, row, [])[1]
+    journal.add(entry_of("test of the communication timeout", "proof"))
+    assert "as set: tested" in recorded(journal, row, [])[0]
+    journal.close()
+
+
+@pytest.mark.parametrize(
+    ("sent", "ago", "kept"),
+    [("Quick stop", 3.0, True), ("Ramp stop", 3.0, False), ("Ramp stop", 30.0, True)],
+)
+def test_stop_is_recorded_as_the_method_that_was_sent(
+    sent: str, ago: float, kept: bool, tmp_path: Path
+) -> None:
+    journal, now = Journal(tmp_path), time.monotonic()
+    journal.add(entry_of(f"stopped: {sent}", "write", ago))
+    points = [TrendPoint(now - 5 + t, (max(0.0, 20.0 - 10 * max(0, t - 2)), 1.0)) for t in range(5)]
+    entries, texts = recorded(journal, StepRow("stop", "quick-stop"), points)
+    assert bool(entries) is kept
+    assert ("another one: Ramp stop" in texts) is not kept
+    journal.close()
 
 
 @pytest.mark.sweep

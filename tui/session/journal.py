@@ -139,6 +139,12 @@ class Journal:
             return tuple(entry for entry in self._recent if entry.kind == "write")
 
     @property
+    def proofs(self) -> tuple[Entry, ...]:
+        """Tests of a communication loss since the start, oldest first."""
+        with self._changed:
+            return tuple(entry for entry in self._recent if entry.kind == "proof")
+
+    @property
     def sent(self) -> tuple[Entry, ...]:
         """Writes whose frame was sent, or may have been; oldest first."""
         with self._changed:

@@ -11,7 +11,7 @@ from tui.drive.model import model_read
 from tui.drive.settings.writable import AT_REST
 from tui.session.console import DriveConsole
 from tui.session.shown import Quality, Shown
-from tui.session.startup.evidence import SteadyRun, last_run, last_steady, last_stop
+from tui.session.startup.evidence import SeenStop, SteadyRun, last_run, last_steady, last_stop
 from tui.session.startup.judging import (
     AS_REQUIRED,
     OTHER_WAY,
@@ -30,6 +30,10 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.journal import Entry
 
+STOPPED_BY = "stopped: "
+"""Begin of the reason of a stop in the journal."""
+STOP_BEFORE = 1.0
+"""Longest time in s between a stop in the journal and its first effect in the trend."""
 VALUE_OLD_AFTER = 6.0
 """Age in seconds above which a value is not current."""
 RUN_FIRST = "{what}: press a to arm, r, type {hz}, Enter. Then press B, and Enter again."
@@ -111,6 +115,9 @@ class RunRows(PanelScreen):
         elif row.kind == "stop":
             if (seen := last_stop(points, since)) is not None:
                 when = self._clock_text(seen.end)
+                if other := self._other_method(row.key, seen):
+                    self.app.tell(f"Not recorded: the last stop was another one: {other}.")
+                    return
                 if any(when in entry for entry in start_up.record.entries.values()):
                     self.app.tell("This stop is recorded already. Run and stop the motor again.")
                     return
@@ -126,6 +133,21 @@ class RunRows(PanelScreen):
             self._enter(row, RUN, when if value is None else f"{when}, {abs(value):.1f} Hz")
             return
         self._go_and_run(row, hertz)
+
+    def _other_method(self, method: str, seen: SeenStop) -> str:
+        """Return the command of this program that stopped the motor, if it was another one."""
+        charts = self.session.profile.data.charts
+        names = {order.name for chart in charts for order in chart.orders if order.id == method}
+        end = self.app.clock.wall_of(seen.end)
+        sent = [
+            entry.why.removeprefix(STOPPED_BY)
+            for entry in self.console.journal.sent
+            if entry.why.startswith(STOPPED_BY)
+            and (entry.line, entry.device) == (self.session.line_text, self.session.device)
+            and after(entry, end - seen.seconds - STOP_BEFORE)
+            and not after(entry, end + STOP_BEFORE)
+        ]
+        return sent[-1] if sent and names.isdisjoint(sent) else ""
 
     @property
     def _has_no_frequency(self) -> bool:
@@ -186,8 +208,8 @@ class RunRows(PanelScreen):
         mine = (self.session.line_text, self.session.device)
         found = [
             entry
-            for entry in self.console.journal.recent
-            if entry.kind == "proof" and (entry.line, entry.device) == mine and after(entry, since)
+            for entry in self.console.journal.proofs
+            if (entry.line, entry.device) == mine and after(entry, since)
         ]
         if not found:
             self.app.action_goto(SOURCES)
