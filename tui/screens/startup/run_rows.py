@@ -121,7 +121,7 @@ class RunRows(PanelScreen):
                 if any(when in entry for entry in start_up.record.entries.values()):
                     self.app.tell("This stop is recorded already. Run and stop the motor again.")
                     return
-                text = f"{when}, from {seen.hertz:.1f} Hz in {seen.seconds:.1f} s"
+                text = f"{when}, {seen.hertz:.1f} Hz in {seen.seconds:.1f} s"
                 self._enter(row, row.key, text)
                 return
             if self._has_no_frequency and (run := last_run(points, since)) is not None:
