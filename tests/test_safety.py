@@ -866,6 +866,7 @@ def test_drive_is_reported_after_half_of_its_timeout(after: float, warned: bool)
         _kept={1: kept},
         _watch=lambda _: SimpleNamespace(active=True, timeout=10.0),
         _heard=lambda _: clock.monotonic() - after,
+        _line=SimpleNamespace(facts=SimpleNamespace(paused={})),
     )
     assert bool(LineWatch.warnings(cast(Any, watch))) is warned
 

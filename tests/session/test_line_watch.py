@@ -133,6 +133,8 @@ async def test_drive_silent_for_half_its_timeout_is_reported(
         assert warning.device == 1
         assert warning.watch.timeout == 100.0
         assert warning.left == pytest.approx(100.0 - silent, abs=10.0)
+    kept.line.facts.pause_polling(1, "its timeout is being tested")
+    assert kept.watch.warnings() == []
 
 
 async def test_drive_without_a_timeout_is_neither_kept_alive_nor_reported(
@@ -199,7 +201,7 @@ class Watched:
             let_go=lambda device: self.done.append(("let go", device)),
         )
         self.line = SimpleNamespace(
-            facts=SimpleNamespace(keep_alives=keep_alives), spawn=self._spawn,
+            facts=SimpleNamespace(keep_alives=keep_alives, paused={}), spawn=self._spawn,
             device_state=lambda device: SimpleNamespace(heard=self.heard),
         )  # fmt: skip
         self.heard: float | None = None

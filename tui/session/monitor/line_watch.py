@@ -213,8 +213,8 @@ class LineWatch:
         found = []
         for device, kept in self._kept.items():
             watch = self._watch(kept)
-            if watch is None or not watch.active:
-                continue
+            if watch is None or not watch.active or device in self._line.facts.paused:
+                continue  # a pause on purpose is reported by the program that tests the timeout
             silent = kept.session.clock.monotonic() - self._heard(kept)
             if silent > WARNED_AT_SHARE * watch.timeout:
                 found.append(TimeoutWarning(device, kept.session.profile, silent, watch))
