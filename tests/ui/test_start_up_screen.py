@@ -97,7 +97,7 @@ async def test_number_of_the_nameplate_is_proposed_and_only_staged() -> None:
 
 
 def recorded(journal: Journal, row: StepRow, points: list[TrendPoint]) -> tuple[str, str]:
-    """What Enter on a row records, and what it tells otherwise."""
+    """Press Enter on a row; return the entry, and the message otherwise."""
     entries: list[str] = []
     texts: list[str] = []
     session = DriveSession(FakeLine(), 1, library.load("atv71"))
