@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import asyncio
+import importlib
 import math
+import time
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
@@ -23,6 +28,7 @@ from tui.session.starts.starts import Starts
 from .commands import ended, run, tcp_line
 from .printed import documents
 
+stop_command = importlib.import_module("tui.cli.commands.stop")
 NAMELESS = DriveIdentity(1, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
 
 
@@ -38,6 +44,19 @@ def test_drive_whose_polling_is_paused_is_stopped_too() -> None:
         assert "Device 1, Altivar 71: stopped" in reported
         assert "Device 2, Altivar 312: stopped" in reported
         assert opened.line.facts.stops.totals == {1: 1, 2: 1}
+
+
+@pytest.mark.parametrize("heard", [None, -1.0, 1.0])
+async def test_stop_that_is_not_answered_is_reported_early(
+    heard: float | None, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(stop_command, "SILENT_FOR", 0.01)
+    at = None if heard is None else time.monotonic() + heard
+    line = SimpleNamespace(device_state=lambda _: SimpleNamespace(heard=at))
+    async with stop_command.silence_reported(cast(Any, line), 7):
+        await asyncio.sleep(0.05)
+    answered = heard is not None and heard > 0
+    assert ("NOT STOPPED yet: device 7" in capsys.readouterr().err) is not answered
 
 
 async def stop_of(line: FakeLine, patience: Priority) -> str:

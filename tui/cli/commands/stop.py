@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
 import click
@@ -34,6 +36,7 @@ from ..shared.pending_timeouts import PolledDrive, look_after
 from ..shared.registration import WRITING, command
 
 if TYPE_CHECKING:
+    from tui.bus.api import ModbusLine
     from tui.drive.profile.schema import OrderId
     from tui.session.command.stop import Stopper
     from tui.session.command.stop_report import StopReport
@@ -41,6 +44,12 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 USUAL_ADDRESSES = "1-10"
+SILENT_FOR = 4.0
+"""Seconds without an answer to the first stop after which it is reported."""
+NOT_ANSWERED = (
+    "NOT STOPPED yet: device {device} has not answered for {seconds:g} s. The stop is repeated."
+    " Stop it at the machine."
+)
 STOP_POLL_INTERVAL = 0.05
 NAMES_NO_FAMILY = (
     "Device {}: NOT STOPPED: it does not identify itself. Name its profile with -p (see drivepanel"
@@ -149,6 +158,24 @@ async def ended(
         await asyncio.sleep(STOP_POLL_INTERVAL)
 
 
+@asynccontextmanager
+async def silence_reported(line: ModbusLine, device: int) -> AsyncIterator[None]:
+    """Report once, while this goes on, that a drive has not answered its stop."""
+    begun = time.monotonic()
+
+    async def warn() -> None:
+        await asyncio.sleep(SILENT_FOR)
+        heard = line.device_state(device).heard
+        if heard is None or heard < begun:
+            complain(NOT_ANSWERED.format(device=device, seconds=SILENT_FOR))
+
+    warning = asyncio.create_task(warn())
+    try:
+        yield
+    finally:
+        warning.cancel()
+
+
 async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
     """Stop one drive: first by a word that stops every possible family, then by its own word.
 
@@ -160,7 +187,8 @@ async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
 
     before = (await remembered(wish.opened)).get(device)
     try:
-        found = await first_stopped(wish, device, before)
+        async with silence_reported(wish.opened.line, device):
+            found = await first_stopped(wish, device, before)
     except LineLost as lost:
         raise LineLost(f"NOT STOPPED: {lost} Stop it at the machine.") from lost
     look_after(wish.opened, found.session, wish.opened.text)
