@@ -94,7 +94,7 @@ def sharing() -> Iterator[str]:
     yield f"{short(shared)}"
     for each in rest:
         yield f"{short(each)}"
-    yield recipes.dump_recipes([(1, "a", "m.set", "d.set"), (2, 'b"', "", "e")])
+    yield recipes.dump_recipes([(1, "a", "m.set", "d.set"), (2, 'b"', "", "e\ud800")])
     for code in HELD:
         yield f"{code}: {recipes.belongs_to_drive(profile, code)}"
     now = SetHead("example-fan", identity={"reference": "EXFAN-11", "version": "1.3"})

@@ -35,6 +35,7 @@ from tui.screens.keys.pages import key_text
 from tui.screens.monitor import arrange, assembly, curves, readouts, words
 from tui.screens.monitor.screen import fault_of_rating
 from tui.screens.trend.view import scale_for, trend_room
+from tui.screens.why import WHY_KEYS
 from tui.session.counters.compare import TurnaroundBar
 from tui.session.record.decoding import HistoryPoint
 from tui.widgets.replay_bar import NO_MOTOR
@@ -179,6 +180,7 @@ def parts() -> Iterator[str]:
         yield from map(drawn, control.left_lines(left, 60))
     yield from map(drawn, pick_lines(profile.parameters[:9], 50))
     yield drawn(hint(("y", "Reset"), ("Esc", "Cancel")))
+    yield drawn(WHY_KEYS)
     for count, visible in ((0, None), (1, 1), (9, 4), (2, None)):
         yield matches_text(count, visible)
     yield f"{[ago_text(seconds) for seconds in (0, 59, 61, 3599, 7300, 90000, 9e6)]}"
