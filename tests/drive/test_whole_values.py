@@ -36,6 +36,7 @@ from tui.drive.errors import DriveError
 from tui.drive.family_page import family_page, page_lines
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
+from tui.drive.profile.rules.meanings import PORT_BAUDS
 from tui.drive.settings import compare, factory, in_force, limits, selection, writable
 from tui.drive.settings.edits import Edits, command_settings, commander_changes, consequences
 
@@ -288,6 +289,7 @@ def scales() -> Iterator[str]:
         for offset in ("0", "-50", "0.125"):
             numbers = [str(values.engineering(raw, own, offset)) for raw in (0, 1, -17, 32767)]
             yield f"{scale} {offset}: {values.decimals_of(own)} {numbers}"
+    yield f"{sorted(PORT_BAUDS)}"
     for percent, rating in (("50", "4.8"), ("33.3", "100"), ("-12.5", "0.10")):
         yield f"{values.percent_of(Decimal(percent), Decimal(rating))}"
 

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import pytest
 from rich.text import Text
+from textual.binding import Binding
 
 from tests.drive.test_whole_values import HELD, OTHER, whole
 from tests.recorded import result, sections
@@ -118,6 +119,8 @@ def keys() -> Iterator[str]:
         used = KEYS if name in ("monitor", "faults") else KEYS[:20]
         yield f"{name}: {[text for key in used if (text := table.elsewhere(name, key, key))]}"
         yield f"  {[table.once_closed(name, key, key) for key in ('r', 'x', 's', 'f1', 'ctrl+z')]}"
+        bound = [b for b in table.bindings(name) if isinstance(b, Binding)]
+        yield f"  {' '.join(f'{b.key}:{b.action}' for b in bound)}"
         yield f"  {' '.join(key for key, shows in table.key_meanings(name).items() if shows)}"
     yield f"{[key_text(key) for key in KEYS]} {unknown_text(b'')} {unknown_text(bytes(range(40)))}"
 
