@@ -341,7 +341,7 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
     ),
     "a pair over another word": (
         [("\n[[enumerations]]", f"{PAIR.replace('302', '299')}\n[[enumerations]]")],
-        "PAIR is uint32 and uses 299 and 300",
+        "PAIR is uint32 and uses 299 to 300",
         "address = 299",
     ),
     "a pair that could not be written": (
