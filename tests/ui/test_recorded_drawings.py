@@ -6,6 +6,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import date
 from itertools import product
 from pathlib import Path
 
@@ -15,7 +17,9 @@ from textual.binding import Binding
 
 from tests.drive.test_whole_values import HELD, OTHER, whole
 from tests.recorded import result, sections
+from tests.session.test_recorded_texts import ENTRIES, NOON
 from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
+from tui.bus.model import TURNAROUND_EDGES, DeviceCounters
 from tui.drive.control_source import source_changes
 from tui.screens.command.teaching import fault_of_look, words_to_teach
 from tui.screens.connection import choices, wall
@@ -27,18 +31,22 @@ from tui.screens.dialogs.pick_parameter import pick_lines
 from tui.screens.dialogs.question import hint, matches_text
 from tui.screens.faults.parts import ago_text, dated_text, labelled
 from tui.screens.frames.choice import choice_of
-from tui.screens.frames.counters_view import bar_lines, beside, time_text
+from tui.screens.frames.counters_view import bar_lines, beside, counters_lines, time_text
 from tui.screens.frames.frame_list import count_text
 from tui.screens.frames.frame_view import gap_text
 from tui.screens.keys import table
 from tui.screens.keys.first_keys import unknown_text
 from tui.screens.keys.pages import key_text
+from tui.screens.messages.changes import change_count_text, change_list_lines
 from tui.screens.monitor import arrange, assembly, curves, readouts, words
 from tui.screens.monitor.screen import fault_of_rating
 from tui.screens.trend.view import scale_for, trend_room
 from tui.screens.why import WHY_KEYS
-from tui.session.counters.compare import TurnaroundBar
+from tui.session.changes import ChangeList, LineLoss, LineRun
+from tui.session.counters.compare import Bounds, Comparison, DriveCount, TurnaroundBar, differences
+from tui.session.counters.watch import CountersNow
 from tui.session.record.decoding import HistoryPoint
+from tui.session.record.runs import LostLink, RecordedRun
 from tui.widgets.replay_bar import NO_MOTOR
 
 TEXTS = Path(__file__).parent / "recorded_drawings.txt"
@@ -200,7 +208,35 @@ def parts() -> Iterator[str]:
     yield f"{words_to_teach(profile, ['FOUT', 'TRP1', 'CHST', 'GONE'])}"
 
 
-SECTIONS = (gauges, drives, keys, rooms, typed, parts)
+def pages() -> Iterator[str]:
+    total = DeviceCounters(
+        requests=900,
+        replies=880,
+        timeouts=9,
+        checksum=4,
+        exceptions={2: 3},
+        turnarounds=tuple(range(len(TURNAROUND_EDGES) + 1)),
+    )
+    since = replace(total, requests=90, replies=88, timeouts=0, checksum=1)
+    first = DriveCount(100, 5, Bounds(50, 50), Bounds(40, 40))
+    grown = Comparison(first, first).with_look(DriveCount(130, 7, Bounds(90, 90), Bounds(70, 70)))
+    for load, drive, trouble in product(
+        (None, 0.0, 0.456), ((), (("this", grown),)), ("", "The drive refuses function 8.")
+    ):
+        shown = tuple(differences(grown)) if drive else ()
+        found = CountersNow(total, since, 65.0, load, load, "keeper", drive, trouble, shown)
+        for width, height in ((60, 18), (100, 40)):
+            yield from map(drawn, counters_lines(found, "2 Pump", width, height))
+    run = RecordedRun(7, "p", NOON, NOON + 65, 0.5, 0.5, "forward", "30.0 Hz", "", "", "panel (12)")
+    found_changes = ChangeList(ENTRIES, [LineRun("rtu:x", run)])
+    found_changes.losses.append(LineLoss("rtu:x", LostLink(None, NOON, NOON + 9.6, "gone")))
+    for width, day in product((50, 100), (date(2026, 1, 2), date(2026, 2, 2))):
+        yield from map(drawn, change_list_lines(found_changes, width, day))
+    yield f"{change_count_text(found_changes)} {change_count_text(ChangeList(has_more=True))}"
+    yield change_count_text(ChangeList())
+
+
+SECTIONS = (gauges, drives, keys, rooms, typed, parts, pages)
 
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)
