@@ -72,7 +72,8 @@ STARTS = {"bundle", "demo", "lines", "ports", "replay", "serve", "simulate"}
 
 def tried(words: str) -> Iterator[str]:
     """The output of a command line, without the names of the folders of this run."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        patch.setenv("COLUMNS", "100")
         for name, text in FILES.items():
             Path(folder, name).write_text(text, "utf-8")
         places = {"N": NOWHERE, "EXAMPLE": str(ROOT / "docs" / "plan" / "hall-2.toml")}
