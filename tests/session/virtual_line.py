@@ -16,6 +16,7 @@ from tui.bus.ended_exchange import EndedExchange
 from tui.bus.errors import DeviceException, ExchangeError, NoAnswer, RequestRefused
 from tui.bus.expectation import IDENTIFY
 from tui.bus.fake import FakeLine
+from tui.bus.fake_device import FakeDevice
 from tui.bus.limits import CAUTIOUS, STANDARD_EXCEPTIONS
 from tui.bus.line_events import StateChanged
 from tui.bus.link import SerialLink
@@ -24,10 +25,12 @@ from tui.bus.notes import LineNote
 from tui.bus.requests import Objects, Request
 from tui.bus.tally import Tally
 from tui.session.event_notes import EVENTS_OF_LINE, PROFILE_OF_DRIVE, LeftEvent
+from tui.session.record.ghost import GhostRecord
 from tui.session.record.record_file import RecordFile
 from tui.session.record.replay_clock import ReplayClock
 from tui.session.record.schema import EventRow, ReplyRow, reply_row, to_microseconds
 from tui.simulator import DriveSpec, Simulation
+from tui.simulator.ghost import GhostDrive
 
 BEGUN = 1_795_000_000.0
 TIMEOUT = 0.3
@@ -44,13 +47,18 @@ END_OF_TIME = 4e9
 class VirtualLine(FakeLine):
     """A line of simulated drives by `time`, which a test lets go on."""
 
-    def __init__(self, record: Path, *drives: DriveSpec) -> None:
+    def __init__(self, record: Path, *drives: DriveSpec, ghost: GhostRecord | None = None) -> None:
         """`record` is the file of its record, which can be read at any time."""
         self.time = ReplayClock(BEGUN, END_OF_TIME, BEGUN)
         registers: dict[int, dict[int, int]] = {spec.address: {} for spec in drives}
         link = SerialLink("/dev/ttyUSB0", 19200, "8E1")
         super().__init__(registers, link=link, clock=self.time.monotonic)
-        self.simulation = Simulation(drives, clock=self.time.monotonic)
+        ghosts = []
+        if ghost is not None:
+            exchanges, clock = ghost.exchanges, self.time.monotonic
+            ghosts = [GhostDrive(ghost.device, exchanges, ghost.profile, clock=clock)]
+            self.devices[ghost.device] = FakeDevice(ghost.device)
+        self.simulation = Simulation(drives, clock=self.time.monotonic, ghosts=ghosts)
         self.simulation.line.start()
         self._file = RecordFile(record, "serial:/dev/ttyUSB0,19200,8E1", "test")
         self._rows: list[ReplyRow] = []
@@ -100,7 +108,9 @@ class VirtualLine(FakeLine):
         there = self._device(device)
         if not there.silent:
             reply = self.simulation.line.ask(device, pdu)
-        took = TIMEOUT if reply is None else ON_THE_WIRE + reply.turnaround
+        took = TIMEOUT
+        if reply is not None:
+            took = ON_THE_WIRE + reply.turnaround if reply.took is None else reply.took
         self._free = begun + took
         await self.time.sleep(took)
         end = self.time.monotonic()

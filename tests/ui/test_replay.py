@@ -10,6 +10,7 @@ import pytest
 from textual.widgets import Input
 
 from tests.session.test_replay import BEGIN, event, record, row
+from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.drive.profile import library
 from tui.screens.dialogs.ask import Ask
@@ -172,7 +173,8 @@ async def test_hold_and_speed_keys(run: Path) -> None:
         await made.until(lambda: "HELD" in made.shown("strip"))
 
 
-async def test_live_line_beside_a_replay_is_stopped_by_its_keys(run: Path) -> None:
+@pytest.mark.parametrize("key", kept(["space", "f9", "f12"], "space"))
+async def test_live_line_beside_a_replay_is_stopped_by_its_keys(run: Path, key: str) -> None:
     async with replaying(run) as made:
         app = made.app
         replay = app.panel_lines[0]
@@ -188,7 +190,7 @@ async def test_live_line_beside_a_replay_is_stopped_by_its_keys(run: Path) -> No
         app.show_monitor(console)
         await made.until(lambda: "Space STOP LIVE ALL" in made.shown("keys"))
         await made.until(lambda: "REPLAY" in made.shown("strip"))
-        await made.pilot.press("space")
+        await made.pilot.press(key)
         await made.until(lambda: simulation.drive(1).motor.frequency == 0)
         assert any("live lines" in item.text for item in app.events.events)
 

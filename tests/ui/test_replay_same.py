@@ -30,6 +30,8 @@ SMALL_CURVE = re.compile(r" *\d* *[┤│└├].*$", re.MULTILINE)
 """Curve of Faults: its first second is not regular either."""
 FULL_READ = re.compile(r"─+ (?:reading \d+ of \d+ · )?")
 """Progress of the read of all settings, which has a pace of its own, and the rule before it."""
+TRIPPED = re.compile(r"tripped \d\d:\d\d:\d\d")
+"""A trip is up to one cycle later: the panel began new cycles since."""
 CYCLE = 0.5
 SETTLED = 0.15
 """Seconds after the end of a cycle: that of a replay ends a moment later than the recorded one."""
@@ -153,7 +155,7 @@ def without_keys(texts: dict[str, str]) -> dict[str, str]:
     return {
         place: NOW.sub("now", SMALL_CURVE.sub("", text.partition("  x      ")[0]))
         if place == "doctor"
-        else ANSWERS.sub("", text)
+        else TRIPPED.sub("tripped", ANSWERS.sub("", text))
         for place, text in texts.items()
     }
 

@@ -274,7 +274,7 @@ def _seen(console: DriveConsole, look: Look | None, now: float, period: float) -
     `now` and `period` are in seconds.
     """
     snapshot = console.latest
-    if snapshot is not None and (look is None or snapshot.time >= look.time):
+    if snapshot is not None and (look is None or snapshot.time > look.time):
         heard = max((reading.time for reading in snapshot.readings.values()), default=None)
         age = None if heard is None else max(0.0, now - heard)
         each = max(snapshot.period, 1.0) if console.monitor.running else period
