@@ -30,6 +30,7 @@ from tui.bus.share.messages import (
     StopGiven,
 )
 from tui.bus.shared_state import SharedState, commanded_by
+from tui.bus.stop_counts import StopCounts
 
 ME, OTHER, THIRD = Program("me", "panel", 1), Program("other", "run", 2), Program("third", "x", 3)
 HOLDER = Program("keeper", KEEPER, 9)
@@ -282,3 +283,44 @@ def test_request_that_no_device_can_have_is_refused(request_: Any, fits: bool) -
     assert (out_of_range(request_) == "") == fits
     refused = send_refusal(request_, CAUTIOUS)
     assert bool(refused) or fits
+
+
+def test_counts_of_stops_are_read_and_changed_under_their_lock(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A stop that another thread counts in between would be lost."""
+    stops, held = StopCounts(), list[int]()
+
+    class Lock:
+        depth = 0
+
+        def __enter__(self) -> None:
+            self.depth += 1
+
+        def __exit__(self, *_: object) -> None:
+            self.depth -= 1
+
+    class Given(dict[int, Any]):
+        def get(self, *of: Any) -> Any:
+            held.append(lock.depth)
+            return super().get(*of)
+
+    def change(self: object, name: str, value: object) -> None:
+        held.append(lock.depth)
+        object.__setattr__(self, name, value)
+
+    lock = Lock()
+    cast(Any, stops)._lock = lock
+    for changed in (
+        lambda: stops.learn({1: {"a": 1}}), lambda: stops.give("a", (1,), "a key"),
+        lambda: stops.note("a", (1,), (3,), "a key"), lambda: stops.learn_times({1: 1.0}),
+        lambda: stops.learn_greeting("a", {1: {"a": 4}}, ()),
+        lambda: stops.replace({1: {"b": 2}}, "a"),
+    ):  # fmt: skip
+        cast(Any, stops).given = Given(stops.given)
+        held.clear()
+        with monkeypatch.context() as patch:
+            patch.setattr(StopCounts, "__setattr__", change)
+            changed()
+        assert held
+        assert 0 not in held

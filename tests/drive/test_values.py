@@ -521,3 +521,13 @@ def test_set_bits_are_those_that_are_named_and_1() -> None:
     bits = parameter(bits=[{"bit": bit, "name": str(bit)} for bit in (0, 1, 4, 15)]).bits
     for word, names in ((0x8002, "1 15"), (0x0001, "0"), (0x0010, "4"), (0x7FEC, "")):
         assert " ".join(bit.name for bit in set_bits(bits, word)) == names
+
+
+def test_text_is_the_bytes_of_its_words_in_their_order() -> None:
+    text = parameter(type="ascii", words=3)
+    raw = int.from_bytes(b"ATV71\0", "big")
+    assert from_words(text, [0x4154, 0x5637, 0x3100]) == raw
+    assert to_words(text, raw) == (0x4154, 0x5637, 0x3100)
+    for held, shown in ((raw, "ATV71"), (0, "(empty)")):
+        found = decode(text, held, {}, Decimal(1))
+        assert (found.raw, found.number, found.display) == (held, None, shown)

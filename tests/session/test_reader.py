@@ -401,6 +401,20 @@ async def test_only_a_poll_takes_what_the_keeper_has_read(priority: Priority) ->
     assert {reading.origin for reading in found.values()} == {Origin.POLL if polls else Origin.READ}
 
 
+@pytest.mark.parametrize("past_limit", ["silence", "exception"])
+def test_word_of_doubtful_documents_is_apart_if_the_family_ignores_missing_ones(
+    past_limit: str,
+) -> None:
+    functions = [{"code": 3, "name": "Read", "max_read": 20, "past_limit": past_limit}]
+    words = (parameter("P1", 1), parameter("P2", 2, confidence="unverified"))
+    reader = Reader(DriveSession(OneDrive({}), 1, profile_of(*words, functions=functions)))
+    every, none = frozenset({"P1", "P2"}), frozenset[str]()
+    apart = past_limit == "silence"
+    assert reader._by_trust(every) == ((every - {"P2"}, {"P2"}) if apart else (every, none))
+    reader._met.add("P2")
+    assert reader._by_trust(every) == (every, none), "it has answered"
+
+
 def test_shared_reply_may_be_as_old_as_what_is_known() -> None:
     reader, _ = timed_reader()
     assert reader._longest(PAIR, Priority.POLL, 5.0) == 0.0

@@ -533,6 +533,8 @@ async def test_entry_of_a_stored_write_names_its_drive_and_its_values(
     assert (entry.eeprom, entry.drive) == (use, "Nobody Drive 7" if use else "")
     assert (entry.old_raw, entry.old, entry.new_raw, entry.new) == (30, "3.0 s", 50, "5.0 s")
     assert (entry.answer, entry.read_back, entry.kind) == ("ok", 50, "write")
+    plain = parameter_entry(session, word, old=30, new=50, answer="ok", why="a test")
+    assert (plain.eeprom, plain.read_back) == ("write", None), "not refused"
 
 
 async def test_write_reports_if_the_value_was_read_back(
