@@ -34,11 +34,12 @@ ALL, WITHOUT_REPLY = tuple(DIGITS), ("line", "control", "trend")
 """Monitor, Faults and Parameters begin to read again when they open, which a seek does not know."""
 RESET = bytes.fromhex("0621350080")
 LEFT_OUT: dict[str, tuple[str, ...]] = {
-    # messages with the time at which this program got them
-    "": (r"^ \d\d:\d\d:\d\d .*", r"^ +Stop it first\.$"),
+    # messages with the time at which this program got them, and that of a trip: up to a cycle later
+    "": (r"^ \d\d:\d\d:\d\d .*", r"^ +Stop it first\.$", r"(?<=tripped )[\d:]+"),
     # the line, its scan, curves, whose first point depends on the cycle, and ages and counts: both
     # may be a second late
-    "line": (r"^ +Lines .*", r"scan done.*", r"[⠀-⣿×·]", r"\d+ s\b", r"\d+ (good|%)"),
+    "line": (r"^ +Lines .*", r"scan done.*", r"[⠀-⣿×·]", r"\d+ s\b", r"\d+ (good|%)",
+             r"(\d\d:){2}\d\d"),
     # the curve, what is taken from it, and the keys, which a replay does not offer
     "monitor": (
         r"^ *[\d.]* *[┤│└]([^─]| ·|─┬|─ ).*", r"^ +(\d\d:){2}.*", r"(min|max) +[\d.]+",
@@ -87,7 +88,7 @@ def rows_of(app: DrivePanelApp) -> list[str]:
     text = "\n".join(rows)
     for pattern in (*LEFT_OUT[""], *LEFT_OUT[app.place]):
         text = re.sub(pattern, "", text, flags=re.MULTILINE)
-    return [row.strip() for row in text.splitlines() if row.strip()]
+    return [" ".join(row.split()) for row in text.splitlines() if row.strip()]
 
 
 class LivePanel:
@@ -249,7 +250,7 @@ async def cycles(line: VirtualLine, since: float, seconds: float) -> list[list[s
 
 def parts(rows: list[str]) -> list[str]:
     """Return each text of a screen, with the place of its row."""
-    return [f"{at}: {part}" for at, row in enumerate(rows) for part in re.split(r" {2,}", row)]
+    return [f"{at}: {part}" for at, row in enumerate(rows) for part in row.split()]
 
 
 @pytest.mark.sweep
