@@ -406,16 +406,18 @@ def test_holder_has_half_a_second_to_accept_a_heartbeat(monkeypatch: pytest.Monk
 
 
 async def test_stop_is_sent_five_times_until_the_drive_answers() -> None:
-    tries, reported = [], []
+    tries, reported, silent = [], [], []
 
     async def carry_out() -> None:
         tries.append(1)
         raise NoAnswer(1, 6, 8501, "no answer")
 
-    stop = SimpleNamespace(carry_out=carry_out, session=None, ordered=0.0)
+    stop = SimpleNamespace(
+        carry_out=carry_out, session=None, ordered=0.0, tell_silent=lambda: silent.append(1)
+    )
     stopper = SimpleNamespace(_say=lambda *what: reported.append(what))
     await Stopper._carry_out(cast(Any, stopper), cast(Any, stop))
-    assert (len(tries), len(reported)) == (5, 1)
+    assert (len(tries), len(reported), len(silent)) == (5, 1, 5)
 
 
 @pytest.mark.parametrize(

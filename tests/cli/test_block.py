@@ -90,7 +90,7 @@ def test_json_after_a_write_is_one_document(line: str) -> None:
     [
         (("set", "NMA3=LCR"), 5, "Not armed"),
         (("factory",), 5, "Not armed"),
-        (("set", "NMA9=LCR", "--arm"), 5, "no slot"),
+        (("set", "NMA9=LCR", "--arm"), 2, "no slot"),
         (("set", "NCA3=ETA", "--arm"), 5, "can only be read"),
         (("set", "NCA3=CMD", "--arm"), 5, "already in NCA1"),
         (("set", "NCA3=CMD", "--dry-run"), 5, "already in NCA1"),

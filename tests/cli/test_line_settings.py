@@ -44,6 +44,8 @@ def slow_family() -> str:
     text = text.replace('id = "atv312"', 'id = "slow"', 1)
     text = text.replace("baud = 19200\n", "baud = 9600\n", 1)
     text = text.replace('format = "8E1"\n', 'format = "8N2"\n', 1)
+    text = text.replace('role = "baud"\nfactory = 32', 'role = "baud"\nfactory = 28', 1)
+    text = text.replace('role = "format"\nfactory = 3', 'role = "format"\nfactory = 5', 1)
     (folder / "slow.toml").write_text(text, "utf-8")
     library.load.cache_clear()
     assert library.load("slow").data.link.baud == 9600

@@ -70,7 +70,8 @@ def own_drive(folder: Path, text: str, name: str = "mine") -> Path:
     """An own profile, with a help file next to it."""
     whole = (library.packaged_folder() / "atv312.toml").read_text("utf-8")
     path = folder / "mine.toml"
-    path.write_text(whole.replace('id = "atv312"', f'id = "{name}"', 1), encoding="utf-8")
+    own = whole.replace('id = "atv312"', f'id = "{name}"', 1)
+    path.write_text(own.replace("ATV312", "OWN312"), encoding="utf-8")
     if text:
         (folder / "help").mkdir(exist_ok=True)
         (folder / "help" / f"{name}.toml").write_text(text, encoding="utf-8")

@@ -21,6 +21,7 @@ from tui.screens.control.map_screen import MapScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.question import Question
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.frame_list import FEW
 from tui.screens.frames.heard import ListeningScreen
@@ -288,7 +289,7 @@ async def test_selecting_another_bit_word_draws_that_alone(size: tuple[int, int]
         assert [line.plain for line in motor.lines] == ["as it was"]
 
 
-async def test_help_pauses_drawing_below_it_and_says_so(
+async def test_question_pauses_drawing_below_it_and_says_so(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr("tui.screens.monitor.screen.FROZEN_AFTER", 0.5)
@@ -297,8 +298,8 @@ async def test_help_pauses_drawing_below_it_and_says_so(
         screen = await to_monitor(app, pilot, 2)
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
         state, motor = screen.query_one("#state", Lines), screen.query_one("#motor", Lines)
-        await pilot.press("question_mark")
-        await until(pilot, lambda: isinstance(app.screen, HelpScreen))
+        await pilot.press("q")
+        await until(pilot, lambda: isinstance(app.screen, Question))
         await pilot.pause()
         before, latest = motor.redrawn, screen.console.monitor.latest
         await until(pilot, lambda: any("as of" in line.plain for line in state.lines))
