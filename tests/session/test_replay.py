@@ -22,10 +22,12 @@ from tui.bus.errors import (
     RequestRefused,
 )
 from tui.bus.link import SerialLink
+from tui.session.fleet import Fleet
 from tui.session.record.record_file import RecordFile
 from tui.session.record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from tui.session.record.replay_text import open_replay, parse_replay, time_in
 from tui.session.record.schema import EventRow, ReplyRow
+from tui.session.replay import UnwrittenJournal, pass_lead, take_drives
 
 BEGIN = 1_795_000_000
 LINE = "serial:/dev/ttyUSB0,9600,8N1"
@@ -342,3 +344,24 @@ def test_record_that_is_opened_again_shows_what_a_first_opening_shows(
         else:
             with pytest.raises(NotRecorded):
                 words(line, 300)
+
+
+def test_curve_of_the_open_drive_has_each_recorded_cycle(tmp_path: Path) -> None:
+    """A sample each 10 s would miss the peak of a second."""
+    peak = 250
+    cycles = [
+        row(at, (0x0637, 300, 300, 200 if at == peak else 84), address=3201) for at in range(1, 450)
+    ]
+    text = json.dumps({"profile": "atv71"})
+    path = record(tmp_path, *cycles, events=(event(0.5, "profile", text, 1),))
+    line = ReplayLine(path, BEGIN + 400, lead=60.0)
+    line.open()
+    with closing(line):
+        fleet = Fleet(line, UnwrittenJournal(), None, None, line.clock)
+        take_drives(line, fleet)
+        asyncio.run(pass_lead(line, fleet, 1, lambda console: None, 1.0))
+        points = fleet.consoles[0].monitor.trend
+        fleet.forget()
+    current = {round(point.time - BEGIN): point.values[1] for point in points}
+    assert set(range(1, 340)) <= set(current)
+    assert [at for at, value in current.items() if value == 20.0] == [peak]

@@ -40,8 +40,10 @@ LEFT_OUT: dict[str, tuple[str, ...]] = {
     # may be a second late
     "line": (r"^ +Lines .*", r"scan done.*", r"[⠀-⣿×·]", r"\d+ s\b", r"\d+ (good|%)",
              r"(\d\d:){2}\d\d"),
-    # the curve, what is taken from it, and the keys, which a replay does not offer
+    # the curve, what is taken from it, its marks without room on the axis, and the keys, which a
+    # replay does not offer
     "monitor": (
+        r"(?<=reference)  [^<]*(?=<)",
         r"^ *[\d.]* *[┤│└]([^─]| ·|─┬|─ ).*", r"^ +(\d\d:){2}.*", r"(min|max) +[\d.]+",
         r" +\d+ s(?= │)", r"^ └.*┘$", r"^ +│[ ·⠀-⣿┆]*$", r"─+ (press a, then r|standby)",
     ),

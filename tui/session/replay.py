@@ -26,13 +26,12 @@ from .fleet import Fleet
 from .journal import Entry, Journal
 from .monitor.fault_record import SECONDS_KEPT
 from .monitor.line_watch import GLANCE
-from .monitor.monitor import codes_of_state
 from .reading import Origin, Reading
 from .record.newest import ends_of_cycles
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from .record.runs import history_of, read_events
 from .record.schema import EventRow, to_microseconds
-from .replay_past import means_of, past_times, recall_past
+from .replay_past import PAST_SECONDS, means_of, past_times, recall_past
 
 TRIPS_OF = 4
 """Drives whose trips are events of a replay, if none is open."""
@@ -47,6 +46,10 @@ STEP_MARGIN = 0.03
 """Seconds from the end of a recorded cycle to that of the replay: the recorded ones vary."""
 MOST_SOUGHT = 500
 """Replies in which they are sought."""
+MOST_OF_CURVE = 100_000
+"""Replies of a curve at most."""
+AFTER_REPLY = 0.001
+"""Seconds after a reply at which its values are known, whatever the rounding of times."""
 SOUGHT_PAUSES = 5
 """Periods before the time of a replay in which its cycles are sought."""
 LONGER_THAN_LEAD = 1000.0
@@ -190,6 +193,14 @@ def in_step(line: ReplayLine, device: int | None, since: float, period: float) -
     return since + (ends[-1] + STEP_MARGIN - since) % period
 
 
+def _recorded_cycles(line: ReplayLine, device: int, until: float) -> list[float]:
+    """Return the times just after the recorded cycles of a drive's curve, up to a time."""
+    replies = line.last_before(device, line.at - PAST_SECONDS, until, MOST_OF_CURVE)
+    ends = [end + AFTER_REPLY for end in ends_of_cycles(replies[::-1], until)]
+    # the pause after the last one is not over by then
+    return [*ends, replies[0].ended / 1e6 + AFTER_REPLY] if replies else ends
+
+
 async def pass_lead(
     line: ReplayLine,
     fleet: Fleet,
@@ -206,18 +217,21 @@ async def pass_lead(
     """
     clock, drives, watch = line.clock, fleet.consoles, fleet.line_watch
     shown = fleet.console(device) if device is not None else None
+    begin = clock.monotonic()
+    if not _trips_in_lead(line, device):
+        begin = max(begin, line.at - SECONDS_KEPT)
+    begin = in_step(line, device, begin, period)
     for console in drives:
-        monitored = clock.monotonic() if console is shown else line.at
+        monitored = begin if console is shown else line.at
         events = [e.utc / 1e6 for e in line.events if e.device == console.device]
         times = past_times(clock.begin, line.at, events)
+        if console is shown:
+            cycles = _recorded_cycles(line, console.device, monitored)
+            times = [time for time in times if not cycles or time < cycles[0]] + cycles
+        await asyncio.to_thread(_take_known, line, console.session)  # scales of the curve
         await asyncio.to_thread(recall_past, line, console, watch, times, monitored)
     if shown is not None:
-        if not _trips_in_lead(line, device):
-            await line.run_to(in_step(line, device, clock.monotonic(), period))
-            shown.monitor.start(codes_of_state(shown.session.profile), period)  # its curve
-            watch.keep(shown.session, shown.monitor)
-            await line.run_to(max(clock.monotonic(), line.at - SECONDS_KEPT), EXACT_TAKES)
-        await line.run_to(in_step(line, device, clock.monotonic(), period))
+        await line.run_to(begin, EXACT_TAKES)
         monitor(shown)
         watch.keep(shown.session, shown.monitor)
     await line.run_to(line.at, EXACT_TAKES)

@@ -17,6 +17,7 @@ from .monitor.line_watch import LineWatch
 from .monitor.look import Look, last_that_brought
 from .monitor.monitor import codes_of_state
 from .monitor.trend import Trend, trend_codes
+from .read.reader import Decoding
 from .reading import Origin, Reading
 from .record.replay_line import ReplayLine
 from .record.replay_reader import RecordedReply
@@ -26,7 +27,7 @@ PAST_SECONDS, RECENT_SECONDS = 600.0, 60.0
 """Seconds of a curve before the replay, and of the last part of it that has more samples."""
 PAST_STEP, RECENT_STEP = 10.0, 3.0
 """Seconds between two samples."""
-ROWS_OF_STATE = 32
+ROWS_OF_STATE = 64
 """Last replies of a drive that have all values of its state."""
 VALUES_WITHIN = 12.0
 """Seconds before a sample in which its values were read; the record has means over 10 s."""
@@ -53,7 +54,7 @@ def recall_past(
 ) -> None:
     """Have a drive know its last trip and state, and its curve until it is monitored.
 
-    It reads the record.
+    It reads the record. Values that scales depend on are those that the session knows.
     """
     past, trend = _Past(line, console), Trend(console.session.profile)
     look: Look | None = None
@@ -64,7 +65,7 @@ def recall_past(
             watch.recall(console.device, look)
             if time < monitored:
                 trend.add(look)
-    console.monitor.recall(trend.points)
+    console.monitor.recall(trend)
 
 
 @lru_cache(maxsize=64)
@@ -100,7 +101,9 @@ class _Past:
             for parameter in map(profile.__getitem__, codes_of_state(profile))
         ]
         self._mean_of = means_of(profile).get
-        self._curves = set(trend_codes(profile)) - set(watched_codes(profile))
+        self._curves = set(trend_codes(profile))
+        self._words = set(watched_codes(profile))
+        self._decode = Decoding(console.session).decode
         self._raws: dict[str, int | None] = {}
         self._state: DriveState | None = None
 
@@ -132,12 +135,14 @@ class _Past:
                 if None in words:
                     return None
                 raw = from_words(place.parameter, [word for word in words if word is not None])
-                return Reading.undecoded(place.parameter, raw, reply.ended / 1e6, Origin.POLL)
+                found = Reading.undecoded(place.parameter, raw, reply.ended / 1e6, Origin.POLL)
+                return self._decode(found) if place.parameter.code in self._curves else found
         return None
 
     def _state_of(self, readings: Mapping[str, Reading]) -> DriveState:
         """The state, calculated again if a word has changed that is not one of its curves."""
-        raws = {code: item.raw for code, item in readings.items() if code not in self._curves}
+        curves = self._curves - self._words
+        raws = {code: item.raw for code, item in readings.items() if code not in curves}
         if self._state is None or raws != self._raws:
             self._raws, self._state = raws, drive_state(self._profile, readings)
         return self._state

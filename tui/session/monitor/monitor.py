@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import logging
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
@@ -120,9 +120,9 @@ class Monitor:
         self._notes.ask()
         self._notes.add(self._trend.add(cycle))
 
-    def recall(self, points: Iterable[TrendPoint]) -> None:
-        """Insert points of a record into the trend; not while a worker adds to it."""
-        self._trend.join(points)
+    def recall(self, earlier: Trend) -> None:
+        """Continue the trend of a record; not while a worker adds to it."""
+        self._trend.resume(earlier)
 
     @property
     def running(self) -> bool:

@@ -144,6 +144,11 @@ class Trend:
         times = sorted(point for point in points if point >= last - TREND_SECONDS)
         self._points = deque(points[time] for time in times)
 
+    def resume(self, earlier: Trend) -> None:
+        """Continue another trend of the drive, with the events since its last cycle."""
+        self.join(earlier.points)
+        self._marker = earlier._marker
+
     def note_write(self, written: DeviceWritten) -> None:
         """Note a write to the drive by any program, for the mark of the next cycle."""
         words = classify_words(self._profile, written.words, {})
