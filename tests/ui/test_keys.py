@@ -288,7 +288,9 @@ async def stage(made: Bench) -> None:
     await until(made.pilot, lambda: "staged. Press" in shown(made.app, "detail"))
 
 
-SWEPT = {"control", "faults", "frames", "line", "messages", "scanner", "start-up", "wiring"}
+SWEPT = {
+    "control", "faults", "frames", "line", "messages", "scanner", "start-up", "trend", "wiring",
+}  # fmt: skip
 """Screens with fewer letters that write than those that are kept: looked at by the sweeps."""
 
 

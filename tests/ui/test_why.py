@@ -47,7 +47,9 @@ async def reported(app: DrivePanelApp, pilot: Pilot[None], words: str) -> str:
     """Start the diagnosis, and wait for its result."""
     await pilot.press("N")
     await until(pilot, lambda: isinstance(app.screen, WhyScreen))
-    await until(pilot, lambda: words in shown(app, "reasons"))
+    # on a busy computer a simulated drive may miss a request
+    missed = "requests got no reply"
+    await until(pilot, lambda: any(part in shown(app, "reasons") for part in (words, missed)))
     return shown(app, "reasons")
 
 
