@@ -160,6 +160,17 @@ async def test_seek_back_and_forward_shows_the_state_of_then(run: Path) -> None:
         await made.until(lambda: frequency() in (137, 138))
 
 
+async def test_monitor_reads_on_after_trend_was_opened_from_line(run: Path) -> None:
+    async with replaying(run, at=50) as made:
+        monitor = made.app.chosen.monitor if made.app.chosen else None
+        assert monitor is not None
+        for key, place in (("1", "line"), ("8", "trend"), ("2", "monitor")):
+            await made.pilot.press(key)
+            await made.until(lambda place=place: made.app.place == place)  # type: ignore[misc]
+            await made.pilot.pause()
+        assert monitor.started
+
+
 async def test_hold_and_speed_keys(run: Path) -> None:
     async with replaying(run) as made:
         clock = made.app.replay.clock  # type: ignore[union-attr]

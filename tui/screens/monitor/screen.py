@@ -108,7 +108,7 @@ class MonitorScreen(CursorKeys):
 
     def on_mount(self) -> None:
         """Start polling the drive and refreshing the screen."""
-        if self.app.replay is None or not self.console.monitor.running:
+        if self.app.replay is None or not self.console.monitor.started:
             beside = codes_beside(self.session.profile)
             self.console.monitor.start(period=self.app.period, extra=beside)
         self._timer = self.set_interval(REFRESH, self._look_in_time)

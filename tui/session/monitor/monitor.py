@@ -126,8 +126,13 @@ class Monitor:
 
     @property
     def running(self) -> bool:
-        """True from `start` to `stop`, unless the line has ended the worker."""
+        """True while it polls, by `start` or `also_read`, unless the line has ended the worker."""
         return self._worker is not None and not self._worker.done()
+
+    @property
+    def started(self) -> bool:
+        """True from `start` to `stop`, unless the line has ended the worker."""
+        return self._started is not None and self.running
 
     def listen(self, listener: Listener) -> Callable[[], None]:
         """Call a function with every snapshot, in the line's thread.
