@@ -26,6 +26,7 @@ from tui.screens.command.control import Control
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.keys.action import CONNECTION, KEY_NAMES, LISTENING, OPENING, Action
+from tui.screens.keys.help import HelpScreen
 from tui.screens.keys.table import ACTIONS, EVERYWHERE, TABBED, elsewhere, key_meanings, keys_line
 from tui.screens.monitor.screen import order_keys
 from tui.screens.open_lines import LineOpening
@@ -421,6 +422,9 @@ async def test_key_that_commands_waits_wherever_it_is_pressed() -> None:
         await made.pilot.press("t")
         await until(made.pilot, lambda: isinstance(app.screen, ModalScreen))
         assert at_once(app, *keys) == ["up", "left"]
+        await made.pilot.press("escape", "question_mark")
+        await until(made.pilot, lambda: isinstance(app.screen, HelpScreen))
+        assert at_once(app, *keys) == ["up", "left", "q", "escape"]  # they only close the help
         await made.pilot.press("escape", "slash")
         await until(made.pilot, lambda: app.place == "parameters")
         await until(made.pilot, lambda: isinstance(app.focused, Input))

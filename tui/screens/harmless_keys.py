@@ -49,7 +49,7 @@ class HarmlessKeys(Panel):
         if takes_text(screen):  # the run line: arrows step its reference, and letters close it
             return key in EDITS or (character is not None and character.isdecimal())
         if screen.is_modal:
-            return key in CURSOR_KEYS
+            return key in CURSOR_KEYS or key in getattr(screen, "only_close", ())
         meanings = key_meanings(getattr(screen, "name_of_screen", ""))
         known = [meanings[name] for name in (key, character or key) if name in meanings]
         return all(known) if known else key in CURSOR_KEYS

@@ -57,9 +57,9 @@ class HelpScreen(Framed, ModalScreen[None]):
     """The keys of one screen."""
 
     CSS_PATH = "help.tcss"
-    BINDINGS: ClassVar = [
-        Binding("escape,question_mark,f1,q", "dismiss(None)", "close", show=False)
-    ]
+    only_close = ("escape", "question_mark", "f1", "q")
+    """Keys that do nothing but close this text, so that they need not wait."""
+    BINDINGS: ClassVar = [Binding(",".join(only_close), "dismiss(None)", "close", show=False)]
 
     def __init__(self, screen: str) -> None:
         super().__init__()
