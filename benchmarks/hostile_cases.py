@@ -141,7 +141,8 @@ def profile_case(chance: random.Random, folder: Path) -> None:
     path.write_bytes(mutated(_profile_text(family), chance))
     heads.file_head(path, True, library.packaged_folder())
     heads.request_prefixes(path, True, library.packaged_folder())
-    heads.quick_head(path)
+    for own in (True, False):
+        heads.quick_head(path, own)
     faults = library.all_faults_of(path)
     try:
         profile = library.load_file(path)

@@ -13,7 +13,7 @@ from click.testing import CliRunner
 
 from tui.cli.main import main
 from tui.drive.errors import ProfileError, UnknownParameter, UnknownProfile
-from tui.drive.profile import json_schema, library
+from tui.drive.profile import heads, json_schema, library
 from tui.drive.profile.profile import notations, parse_address
 
 SMALL = """\
@@ -331,3 +331,11 @@ def test_committed_schema_is_up_to_date() -> None:
 
 def test_schema_refuses_unknown_fields() -> None:
     assert json_schema.profile_schema()["$defs"]["Parameter"]["additionalProperties"] is False
+
+
+def test_texts_found_without_a_parser_are_those_of_the_head() -> None:
+    for path, _ in library.profile_files():
+        parsed = heads.quick_head(path, own=True).table
+        texts = {key: value for key, value in parsed.items() if isinstance(value, str)}
+        assert heads.quick_head(path, own=False).table == texts
+        assert texts["id"] == path.stem

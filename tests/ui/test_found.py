@@ -101,11 +101,11 @@ def test_heading_counts_drives_in_each_state() -> None:
         WallRow(5, kind="ready", words="STANDBY"),
     ]
     scan = ["scan done: 5 of 10 addresses", "5 of 10 addresses"]
-    text = heading("a line", drives, scan, 80).plain
+    text = heading(drives, scan, 80).plain
     assert text.startswith(" 5 drives: 2 running, 1 standby, 1 fault, 1 no answer  ")
     assert text.endswith("  5 of 10 addresses ")
-    assert heading("a line", drives, scan, 120).plain.endswith(f"  {scan[0]} ")
-    assert heading("a line", drives, [], 30).plain == " 5 drives: 2 running, ...      "[:30]
+    assert heading(drives, scan, 120).plain.endswith(f"  {scan[0]} ")
+    assert heading(drives, [], 30).plain == " 5 drives: 2 running, ...      "[:30]
 
 
 @pytest.mark.parametrize(("share", "filled"), [(None, 0), (0.0, 0), (0.5, 5), (1.0, 10), (1.5, 10)])

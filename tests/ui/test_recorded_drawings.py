@@ -103,10 +103,8 @@ def drives() -> Iterator[str]:
         yield drawn(wall.column_heads(columns, 60.0 if two else None))
         for row in rows:
             yield drawn(wall.wall_line(row, columns))
-    for shown, scan, width in product(
-        (rows, rows[:1], []), ((), ("scanning 1-31", "scan")), (30, 80)
-    ):
-        yield drawn(wall.heading("rtu:x", shown, scan, width))
+    for shown, scan, width in product((rows, rows[:1]), ((), ("scanning 1-31", "scan")), (30, 80)):
+        yield drawn(wall.heading(shown, scan, width))
     yield f"{wall.state_counts(rows)} {wall.aligned(['1', '1.5', '-20.25', ''])}"
     for share, width in product((None, 0.0, 0.33, 0.999, 1.0, 12.0), (7, 16)):
         yield drawn(wall.load_bar(share, width))

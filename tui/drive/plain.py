@@ -6,7 +6,6 @@ control character is replaced by one visible character, so that the length stays
 
 from __future__ import annotations
 
-import json
 import unicodedata
 from collections.abc import Iterable, Sequence
 
@@ -46,11 +45,15 @@ def escaped_json(text: str) -> str:
     """Return equivalent JSON; every character that could command a terminal is escaped."""
     if text.replace("\n", "").isprintable():
         return text
+    import json  # imported late: speeds up the start
+
     return "".join(json.dumps(c)[1:-1] if c != "\n" and commands(c) else c for c in text)
 
 
 def escaped_toml(text: str) -> str:
     """Return a basic TOML string; every character that could command a terminal is escaped."""
+    import json
+
     quoted = json.dumps(text.encode("utf-8", "replace").decode(), ensure_ascii=False)
     return "".join(f"\\U{ord(c):08X}" if commands(c) else c for c in quoted)
 

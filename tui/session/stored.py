@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import errno
-import json
 import os
 from pathlib import Path
 
@@ -30,13 +29,18 @@ def make_folder(folder: Path) -> None:
 def stored_json(file: Path) -> object:
     """Return the contents of a JSON file; None if it cannot be read or decoded, or is too long."""
     try:
-        return json.loads(read_small_text(file, LONGEST_STORED))
+        text = read_small_text(file, LONGEST_STORED)
+        import json  # imported late: speeds up a start without such files
+
+        return json.loads(text)
     except (OSError, ValueError, RecursionError):
         return None
 
 
 def store_json(file: Path, what: object) -> None:
     """Write a JSON file completely or not at all. Raises OSError."""
+    import json
+
     make_folder(file.parent)
     # JSON escapes keep lone surrogates, which UTF-8 cannot encode
     replace_file(file, json.dumps(what, indent=1).encode(), flushed=False)

@@ -194,6 +194,8 @@ def different(
     nothing: one command erases them all.
     """
     found: list[tuple[int, int]] = []
+    if shown[first:last].count(None) == last - first and None not in wanted[first:last]:
+        return [(first, last)] if first < last else found  # the first picture: nothing is equal
     for place in range(first, last):
         cell = wanted[place]
         if cell is None or shown[place] == cell:
@@ -291,18 +293,18 @@ class Pen:
             text, ansi = cells[place] or (" ", "")
             if not moved:
                 self._put(f"\x1b[{y + 1};{x + place + 1}H")
-            if text != " " or not same_blank(self._ansi, ansi):
+            if ansi != self._ansi and (text != " " or not same_blank(self._ansi, ansi)):
                 self._put(change(self._ansi, ansi))
                 self._ansi = ansi
-            blank = self._blank(cells, place)
+            blank = self._blank(cells, place) if text == " " else 0
             self._put(f"\x1b[{blank}X" if blank else text)
             place, moved = place + (blank or 1), not blank
         self._at = (x + len(cells), y) if moved else None
 
     def _blank(self, cells: Sequence[Cell | None], place: int) -> int:
-        """Return the number of cells from `place` on that are erased rather than written."""
+        """Return the number of blanks from `place` on that are erased rather than written."""
         cell = cells[place]
-        if not self._erases or cell is None or cell[0] != " " or not erasable(cell[1]):
+        if not self._erases or cell is None or not erasable(cell[1]):
             return 0
         end = place
         while end < len(cells) and cells[end] == cell:

@@ -282,8 +282,8 @@ def demo_drives() -> dict[str, tuple[str, float]]:
     Only the beginning of each file is read.
     """
     found: dict[str, tuple[str, float]] = {}
-    for path, _ in profile_files():
-        head = quick_head(path)
+    for path, own in profile_files():
+        head = quick_head(path, own)
         if head.demo_hz is not None and head.text("id"):
             found.setdefault(head.text("id"), (head.text("name"), head.demo_hz))
     return dict(sorted(found.items()))

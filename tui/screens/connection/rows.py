@@ -27,9 +27,6 @@ if TYPE_CHECKING:
     from tui.session.monitor.look import Look
     from tui.session.shown import Shown
 
-
-WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
-
 WIDE_ABOUT = 120
 """Columns from which everything about a drive is in one row."""
 ABOUT, LEFT_LINES = 2, 3

@@ -15,7 +15,6 @@ from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
 from .advice import ALARM_KIND
-from .rows import WATCHED_ONLY
 from .state import LineView
 
 if TYPE_CHECKING:
@@ -27,6 +26,7 @@ if TYPE_CHECKING:
 NONE_AT_ADDRESS = "No drive answered at address {} (2 attempts)."
 NONE_AT_ADDRESSES = "No drive answered at addresses {} (2 attempts)."
 COMPARE_WITH_BACKUP = "Press Ctrl+D on this drive to compare. Nothing is written."
+WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
 NO_SCAN_IN_REPLAY = "This is a replay: it has the drives of its record."
 AFTER_NO_ANSWER = (
     "Press N to diagnose, c to change the addresses, or s to scan again. Ctrl+P lists a scan at"

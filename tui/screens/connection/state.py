@@ -16,7 +16,7 @@ from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
 from tui.session.connect.named_lines import line_settings
-from tui.widgets.drawing import pair, rule
+from tui.widgets.drawing import pair, rule, short
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, KEY, PLAIN, STRONG
 
@@ -27,14 +27,13 @@ from .drive_list import DriveList
 from .line_form import LineForm
 from .line_list import LineList
 from .progress import far_text, left_text, scan_forms
-from .rows import TRUSTED_LOOKS, about_lines, rows_of
-from .wall import WallColumns, WallRow, column_heads, columns_for, heading, wall_line
 
 if TYPE_CHECKING:
     from tui.session.connect.search import Search
     from tui.session.fleet import Fleet, FoundDrive
     from tui.session.monitor.look import Look
 
+    from .wall import WallColumns, WallRow
     from .wall_curves import WallCurves
 
 log = logging.getLogger(__name__)
@@ -58,6 +57,8 @@ KEPT_FROM_REACTING = (
 WIDE_CLASS = "-wide"
 """Class of the screen while the drives have the whole width."""
 NOBODY: Mapping[int, WallRow] = MappingProxyType({})
+NOTHING_BELOW = [Text(""), Text("")]
+"""Rows below the lists while no line is open."""
 
 
 class LineView(PanelScreen):
@@ -189,23 +190,35 @@ class LineView(PanelScreen):
         if not self.is_current:
             return
         self._give_room()
-        fleet, width = self.app.fleet, max(20, self.drives.size.width - 1)
+        rows: Mapping[int, WallRow] = {}
+        lines: Mapping[int, Text] = {}
+        heads: list[Text] = []
+        if self.app.fleet is not None:
+            rows, lines, heads = self._table(self.app.fleet)
+        self.drives.fill(lines, rows, sort=self._is_user_idle())
+        width = self.query_one("#drives-title").size.width
+        self.put("drives-title", self._drives_title(width, rows))
+        self.put("columns", heads)
+        self._show_advice()
+        self.show_about()
+
+    def _table(self, fleet: Fleet) -> tuple[Mapping[int, WallRow], Mapping[int, Text], list[Text]]:
+        """Return the row of each drive, its line as drawn, and the heads of the columns."""
+        # imported late: speeds up the start
+        from .rows import rows_of
+        from .wall import column_heads, columns_for, wall_line
+
+        width = max(20, self.drives.size.width - 1)
         now, wall = self.app.clock.monotonic(), self.app.clock.wall()
         two_rows = 2 * len(self.found) <= self.drives.size.height
         columns = columns_for(width, two_rows=two_rows)
         curves: Mapping[int, tuple[str, ...]] = {}
         scale: float | None = None
-        if fleet is not None and columns.curve:
+        if columns.curve:
             curves, scale = self._draw_curves(fleet, columns, now, wall)
-        connected = self._connected()
-        rows = rows_of(fleet, now, connected=connected, wall=wall, curves=curves) if fleet else {}
+        rows = rows_of(fleet, now, connected=self._connected(), wall=wall, curves=curves)
         lines = {device: wall_line(row, columns) for device, row in rows.items()}
-        self.drives.fill(lines, rows, sort=self._is_user_idle())
-        width = self.query_one("#drives-title").size.width
-        self.put("drives-title", self._drives_title(width, rows))
-        self.put("columns", [column_heads(columns, scale)] if rows else [])
-        self._show_advice()
-        self.show_about()
+        return rows, lines, [column_heads(columns, scale)] if rows else []
 
     def _draw_curves(
         self, fleet: Fleet, columns: WallColumns, now: float, wall: float
@@ -214,6 +227,7 @@ class LineView(PanelScreen):
         # imported late: speeds up the start
         from tui.widgets.curve import curve_signs
 
+        from .rows import TRUSTED_LOOKS
         from .wall_curves import CurveCells, WallCurves
 
         if self._curves is None:
@@ -254,14 +268,22 @@ class LineView(PanelScreen):
         return text
 
     def _drives_title(self, width: int, rows: Mapping[int, WallRow] = NOBODY) -> list[Text]:
-        scan, label = scan_forms(self.search, self.later), self.app.line_label or "No line"
-        return [heading(label, list(rows.values()), scan, width)]
+        if not rows:
+            return [rule(short(self.app.line_label or "No line", max(4, width - 2)), width)]
+        from .wall import heading
+
+        return [heading(list(rows.values()), scan_forms(self.search, self.later), width)]
 
     def show_about(self) -> None:
         """Show details of the drive under the cursor, its next step, and line health."""
         drive, fleet = self.found.get(self.drives.chosen or 0), self.app.fleet
         left = fleet.left_behind(drive.console) if drive and drive.console and fleet else ""
         line = self.app.opened.line if self.app.opened is not None else None
+        if fleet is None and line is None:
+            self.put_all("about", NOTHING_BELOW)
+            return
+        from .rows import about_lines
+
         self.put_all("about", about_lines(drive, left, self.size.width, line))
 
     def on_key(self, event: Key) -> None:

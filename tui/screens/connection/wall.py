@@ -28,7 +28,6 @@ from tui.widgets.palette import (
     STALE,
     STATE_SIGNS,
     STRONG,
-    TITLE,
 )
 
 STATE_STYLE: dict[str, Style] = {
@@ -167,15 +166,11 @@ def _counted_as(row: WallRow) -> str:
     return row.words.lower() or "unknown"
 
 
-def heading(label: str, rows: Sequence[WallRow], scan: Sequence[str], width: int) -> Text:
+def heading(rows: Sequence[WallRow], scan: Sequence[str], width: int) -> Text:
     """Draw the title of the table: the number of drives in each state, and the scan.
 
-    Without a drive it is the name of the line. `scan` are forms of one text, of which the first
-    that fits is shown.
+    `scan` are forms of one text, of which the first that fits is shown.
     """
-    if not rows:
-        text = Text(f"{short(label, max(4, width - 2))} ", TITLE, no_wrap=True)
-        return text.append("─" * max(0, width - text.cell_len), LINE)
     text = Text(no_wrap=True)
     text.append(counted(len(rows), " 1 drive: ", " {count} drives: "), STRONG)
     counts = state_counts(rows)
