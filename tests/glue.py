@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
-from .sources import ROOT, modules, tree_of
+from .sources import ROOT, modules, tree_of, walked
 
 COMPARING = re.compile(
     "remove(suf|pre)fix|(starts|ends)with|r?(split|partition)|replace|strip"
@@ -129,8 +129,8 @@ FORMS: dict[str, Form] = {
 
 def _fragments(tree: ast.Module) -> Iterator[ast.AST]:
     """Yield texts that begin inside a sentence: `", not all of which were asked"`."""
-    apart = {id(inner) for node in ast.walk(tree) for inner in _not_pieces(node)}
-    for node in ast.walk(tree):
+    apart = {id(inner) for node in walked(tree) for inner in _not_pieces(node)}
+    for node in walked(tree):
         text = _words(node)
         is_text = isinstance(node, ast.Constant | ast.JoinedStr) and id(node) not in apart
         is_label = text.endswith(" ")  # with its margins
@@ -154,7 +154,7 @@ def _not_pieces(node: ast.AST) -> Iterator[ast.AST]:
 
 def glued(tree: ast.Module, path: str) -> Iterator[Glue]:
     """Yield each glued text of a module."""
-    for node in ast.walk(tree):
+    for node in walked(tree):
         for form, found in FORMS.items():
             if found(node):
                 yield Glue(path, node.lineno, form, ast.unparse(node))  # type: ignore[attr-defined]

@@ -24,9 +24,14 @@ def tree_of(path: Path) -> ast.Module:
 
 
 @cache
+def walked(tree: ast.AST) -> tuple[ast.AST, ...]:
+    """Return all nodes of a tree, from the outside in; kept, as several tests go through them."""
+    return tuple(ast.walk(tree))
+
+
 def nodes_of(path: Path) -> tuple[ast.AST, ...]:
     """Return all nodes of a module, from the outside in."""
-    return tuple(ast.walk(tree_of(path)))
+    return walked(tree_of(path))
 
 
 def calls_of(name: str, folder: Path = PACKAGE) -> Iterator[tuple[Path, ast.Call]]:

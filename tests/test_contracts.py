@@ -20,7 +20,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from .programs import PATIENCE
-from .sources import PACKAGE, ROOT, modules, nodes_of, tree_of
+from .sources import PACKAGE, ROOT, modules, nodes_of, tree_of, walked
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 CI = ROOT / ".ci" / "run"
@@ -50,7 +50,7 @@ def test_imports_point_downward_only() -> None:
 
 def imported(tree: ast.Module, package: str, names: frozenset[str]) -> Iterator[str]:
     """Yield the modules of `names` that a module imports: at its top, in functions, for types."""
-    for node in ast.walk(tree):
+    for node in walked(tree):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in names)
         elif isinstance(node, ast.ImportFrom):

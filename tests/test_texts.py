@@ -18,7 +18,7 @@ import pytest
 import tomli
 
 from .glue import all_glued, glued
-from .sources import ROOT, modules, tree_of
+from .sources import ROOT, modules, tree_of, walked
 
 TESTS = ROOT / "tests"
 FIRST_COMMIT = "2b17417"
@@ -168,7 +168,7 @@ GLUED = {
 
 def _docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
     """Docstrings, those of attributes included: strings that are statements."""
-    for node in ast.walk(tree):
+    for node in walked(tree):
         match node:
             case ast.Expr(value=ast.Constant(value=str()) as text):
                 yield text
@@ -177,7 +177,7 @@ def _docstrings(tree: ast.Module) -> Iterator[ast.Constant]:
 def texts_of(source: ast.Module, path: str, kinds: str = "USNL") -> Iterator[Text]:
     """Every text of a module, by kind."""
     documents = {id(node) for node in _docstrings(source)}
-    for node in ast.walk(source):
+    for node in walked(source):
         match node:
             case ast.Constant(value=str(text)):
                 kind = "S" if id(node) in documents else "U"

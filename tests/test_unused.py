@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from .sources import PACKAGE, modules, tree_of
+from .sources import PACKAGE, modules, tree_of, walked
 
 CALLED_BY_OTHERS = re.compile(
     r"__\w+__|(on|action|watch|key|validate|check)_\w+"  # Textual finds these by their names
@@ -34,7 +34,7 @@ HOOKS = {
 
 def defined(tree: ast.Module) -> Iterator[str]:
     """Yield functions, classes, methods and constants at any level."""
-    for node in ast.walk(tree):
+    for node in walked(tree):
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.name
     for node in tree.body:
@@ -45,7 +45,7 @@ def defined(tree: ast.Module) -> Iterator[str]:
 
 def used(tree: ast.Module) -> Iterator[str]:
     """Yield names that are read, and words of texts: tables name what they call."""
-    for node in ast.walk(tree):
+    for node in walked(tree):
         match node:
             case ast.Name(id=name, ctx=ast.Load()) | ast.Attribute(attr=name):
                 yield name

@@ -226,7 +226,7 @@ async def test_motor_at_standstill_after_a_quick_stop_is_not_stopping() -> None:
         await until(made.pilot, lambda: "□ STOPPED" in picture(made.app))
 
 
-@pytest.mark.parametrize("family", kept(FAMILIES, "atv71", "powerdrive"))
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv71"))
 async def test_drive_is_armed_run_reversed_stopped_tripped_and_reset(family: str) -> None:
     async with bench(family) as made:
         await made.running()
@@ -294,7 +294,11 @@ async def test_reset_without_a_fault_says_so() -> None:
 
 @pytest.mark.parametrize(
     ("family", "sets"),
-    [("atv31", {"CHCF": 2, "Cd1": 1}), ("powerdrive", {"6.43": 0}), ("atv71", {})],
+    [
+        ("atv31", {"CHCF": 2, "Cd1": 1}),
+        pytest.param("powerdrive", {"6.43": 0}, marks=pytest.mark.sweep),
+        pytest.param("atv71", {}, marks=pytest.mark.sweep),
+    ],
 )
 async def test_failed_reset_text_is_not_cut_at_80x24(family: str, sets: dict[str, int]) -> None:
     async with bench(family, sets=sets) as made:

@@ -14,6 +14,7 @@ from textual.pilot import Pilot
 from textual.widgets import OptionList
 
 from tests.programs import PATIENCE, rtu_tcp
+from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.screens.base import PanelScreen
 from tui.screens.dialogs.leave import Leave
@@ -85,7 +86,7 @@ async def in_a_worker(made: Bench, fail: Fail) -> None:
     made.app.simulate_key("s")
 
 
-@pytest.mark.parametrize("where", [in_drawing, in_a_key, in_a_worker])
+@pytest.mark.parametrize("where", kept([in_drawing, in_a_key, in_a_worker], in_a_worker))
 @pytest.mark.internal_errors
 def test_internal_error_stops_the_motor_before_the_line_closes(
     where: Callable[[Bench, Fail], Awaitable[None]],

@@ -527,7 +527,7 @@ FAMILY = {
 """The drive of the question, unless it is an Altivar 71."""
 
 
-@pytest.mark.parametrize("name", kept(QUESTIONS, "write", "control", "coast"))
+@pytest.mark.parametrize("name", kept(QUESTIONS, "write"))
 async def test_only_y_writes(name: str) -> None:
     way, kind = QUESTIONS[name]
     async with bench(FAMILY.get(name, "atv71")) as made:
