@@ -47,6 +47,9 @@ def starts_by_mistake(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                         f" {run.id}, so it would run the motor.",
                     )
                     break
+            else:
+                if fault := _starts_besides(chart, order, runs):
+                    yield at, f"order {order.id}: {fault}"
         for place, lock in enumerate(chart.interlocks):
             if stops := [stop for stop in (*SURE_STOPS, "emergency-stop") if stop in lock.orders]:
                 yield (
@@ -54,6 +57,48 @@ def starts_by_mistake(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                     f"chart {chart.id}: an interlock prevents {', '.join(stops)}. A stop has no"
                     " conditions.",
                 )
+
+
+def _starts_besides(chart: Chart, order: Order, runs: list[Order]) -> str:
+    """Return why a stop or a reset would also start the motor; empty if it does not.
+
+    The start bits are those in which a run command differs from the stop of the same register.
+    On some drives, another bit of such a word stops the motor. A stop may contain them if a
+    transition with it leads out of a running state, or if it is followed by the stop of all states.
+    """
+    if order.id not in (*SURE_STOPS, "reset"):
+        return ""
+    states = {state.id: state for state in chart.states}
+    stopping = {
+        unsigned(step.command)
+        for step in chart.transitions
+        if step.command is not None
+        and _is(states, step.source, "running")
+        and not _is(states, step.target, "running")
+    }
+    for run, stop in ((run, stop) for run in runs for stop in chart.orders if stop.id == "stop"):
+        code = run.parameter or chart.command
+        registers = {way.parameter or chart.command for way in (order, stop)}
+        if registers != {code} or not stop.words or stop.when not in ([], run.when):
+            continue
+        last, kept = unsigned(run.words[-1]), _option_bits(chart, code)
+        start = (last ^ unsigned(stop.words[-1])) & ~kept
+        for word in map(unsigned, order.words):
+            declared = order.id != "reset" and (word in stopping or bool(order.states))
+            if start & last and not (word ^ last) & start and not declared:
+                return (
+                    f"its word {word:#06x} contains the start bits {start:#06x}, in which"
+                    f" {run.id} differs from stop, so it would run the motor."
+                )
+    return ""
+
+
+def _option_bits(chart: Chart, code: str) -> int:
+    """Return the bits of a command word that options keep."""
+    kept = 0
+    for option in chart.options:
+        kept |= option.mask if option.parameter == code else 0
+    return kept
 
 
 def _run_faults(chart: Chart, order: Order, runs: list[Order]) -> Iterator[str]:
@@ -70,9 +115,7 @@ def _same(chart: Chart, order: Order, word: int, run: Order) -> bool:
     code = run.parameter or chart.command
     if (order.parameter or chart.command) != code:
         return False
-    kept = 0
-    for option in chart.options:
-        kept |= option.mask if option.parameter == code else 0
+    kept = _option_bits(chart, code)
     return not (unsigned(word) ^ unsigned(run.words[-1])) & ~kept
 
 
