@@ -206,6 +206,21 @@ def test_interlock_blocks_what_it_names_unless_its_word_allows_it() -> None:
     assert interlock_codes(chart_of(interlocks=[{**plain, "when": [ON]}, plain])) == ["P", "X"]
 
 
+def test_local_control_blocks_a_start_and_no_stop() -> None:
+    profile = library.load("v20")  # without words of a channel
+    local = {"parameter": "S", "bit": 9, "value": 0}
+    chart = chart_of(made("forward", 1), made("stop", 0), local=local)
+    held = blocked_reason(profile, chart, "forward", {"S": 0})
+    assert held is not None
+    assert held.text == "The drive is in local control (S bit 9): it is not commanded by Modbus."
+    assert held.by_channel
+    assert blocked_reason(profile, chart, "forward", {"S": 0x200}) is None
+    assert blocked_reason(profile, chart, "forward", {}) is not None, "not known"
+    for id in (*STOP_ORDERS, "reset"):
+        assert blocked_reason(profile, chart, id, {"S": 0}) is None
+    assert interlock_codes(chart) == ["S"]
+
+
 def test_unmet_condition_is_named_if_every_form_of_a_command_has_one() -> None:
     first, second = (
         made("forward", 1, when=[ON]),

@@ -184,6 +184,27 @@ def test_command_with_an_unmet_interlock_has_no_effect() -> None:
     """)
 
 
+def test_local_control_ends_the_run_and_ignores_run_commands() -> None:
+    rig = Exchange(words(local={"parameter": "STATUS", "bit": 9}), {"SOURCE": 2}, run_hz=20.0)
+    rig.play(". 3")
+    rig.drive.keypad["LOC"]()
+    rig.play("""
+        . 3
+        > 02 06 2000 0012
+        . 1
+        > 02 03 2101 0001
+        < 02 03 02 0200                # local, stopped
+    """)
+    rig.drive.keypad["REM"]()
+    rig.play("""
+        . 1
+        > 02 06 2000 0012
+        . 1.5
+        > 02 03 2101 0001
+        < 02 03 02 0103
+    """)
+
+
 def test_motor_left_running_by_another_master_is_stopped_by_the_line() -> None:
     Exchange(words(), run_hz=20.0).play("""
         . 1.5

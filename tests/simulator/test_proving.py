@@ -12,7 +12,8 @@ from tui.cli.main import main
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.simulator.charts.own import OwnChart
-from tui.simulator.proving.proof_steps import prove_profile
+from tui.simulator.proving.proof_bench import ProofBench
+from tui.simulator.proving.proof_steps import command_steps, prove_profile
 
 from .exchange import Exchange
 from .test_chart_own import words
@@ -112,6 +113,32 @@ def test_run_of_the_wrong_way_fails(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_drive_that_ignores_its_limits_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.simulator.body.Body.unlimited", property(lambda _: True))
     assert "values beyond limits are refused" in failed(library.load_file(MS300))
+
+
+LOCAL = ("orders = [", 'local = { parameter = "STATUS", bit = 9, value = 0 }\norders = [')
+LOCK = (
+    "orders = [",
+    'interlocks = [{ parameter = "STATUS", mask = 0x100, values = [0x100], text = "Open." }]\n'
+    "orders = [",
+)
+
+
+@pytest.mark.parametrize(
+    ("change", "title"),
+    [(LOCAL, "local control blocks a start"), (LOCK, "the interlock of STATUS blocks a start")],
+)
+def test_local_control_and_interlocks_are_proved(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, change: tuple[str, str], title: str
+) -> None:
+    path = tmp_path / "own.toml"
+    path.write_text(MS300.read_text("utf-8").replace(*change, 1), "utf-8")
+    profile = library.load_file(path)
+    steps = command_steps(profile)
+    assert {step.title: step.fault for step in steps if step.title == title or step.fault} == {
+        title: ""
+    }
+    monkeypatch.setattr(ProofBench, "blocked", lambda *_: None)
+    assert [step.title for step in command_steps(profile) if step.fault] == [title]
 
 
 def test_result_is_printed_as_json(tmp_path: Path) -> None:

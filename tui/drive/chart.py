@@ -56,9 +56,9 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
         state=state_now(profile, chart, raws),
         own=state_of(chart, raws),
         direction=_direction(chart.direction, raws),
-        reached=_status_bit(chart.reached, raws),
-        alarm=_status_bit(chart.alarm, raws),
-        local=_status_bit(chart.local, raws),
+        reached=status_bit(chart.reached, raws),
+        alarm=status_bit(chart.alarm, raws),
+        local=status_bit(chart.local, raws),
         channel=_commanded_by(profile, chart, raws),
         reference=found.text if (found := reference_channel(profile, raws)) else "",
     )
@@ -143,7 +143,8 @@ def _channel(bits: ChannelBits | None, raws: Mapping[str, int]) -> str:
     return bits.names.get(str(word >> bits.shift & bits.mask), "")
 
 
-def _status_bit(mark: StatusBit | None, raws: Mapping[str, int]) -> bool | None:
+def status_bit(mark: StatusBit | None, raws: Mapping[str, int]) -> bool | None:
+    """Return True if a mark of the status holds; None without one, or if its word is unknown."""
     if mark is None or (word := raws.get(mark.parameter)) is None:
         return None
     return word >> mark.bit & 1 == mark.value

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .channel import Channel, command_channel
-from .chart import state_now
+from .chart import state_now, status_bit
 from .orders import MOVING_ORDERS, OrderRefused, choose, locked_by, order_target, unmet, walk
 from .profile.profile import Profile
 from .profile.schema import Chart, OrderId
@@ -53,7 +53,23 @@ def blocked_reason(
         text = f"The drive is not commanded by Modbus: {when.parameter} is {shown}."
         way: UnblockHint = "take-control" if _takes_control(profile, chart, when.parameter) else ""
         return CommandBlocked(text, "", way, by_channel=True)
-    return None
+    return _in_local(chart, raws)
+
+
+IN_LOCAL = "The drive is in local control ({code} bit {bit}): it is not commanded by Modbus."
+
+
+def _in_local(chart: Chart, raws: Mapping[str, int]) -> CommandBlocked | None:
+    """Return the reason if the drive shows local control, or may be in it."""
+    if (mark := chart.local) is None:
+        return None
+    code, held = mark.parameter, status_bit(mark, raws)
+    if held is None:
+        return CommandBlocked(f"{code}, which shows local control, was not read.")
+    if not held:
+        return None
+    text = IN_LOCAL.format(code=code, bit=mark.bit)
+    return CommandBlocked(text, "Switch it to remote at the drive.", by_channel=True)
 
 
 def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:

@@ -209,9 +209,10 @@ def unmet(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> When | None:
 
 
 def interlock_codes(chart: Chart) -> list[str]:
-    """Return the codes of the words that the interlocks of a chart check."""
+    """Return the codes of the words that block a start: those of interlocks and local control."""
     codes = [lock.parameter for lock in chart.interlocks]
     codes += [when.parameter for lock in chart.interlocks for when in lock.when]
+    codes += [chart.local.parameter] if chart.local is not None else []
     return list(dict.fromkeys(codes))
 
 

@@ -210,7 +210,7 @@ BENCH: Mapping[str, BenchCommand] = {
     ),
     "key": BenchCommand(
         ("STOP", "LOC", "REM", "RUN"),
-        "Press a key of the keypad. LOC, REM and RUN are those of the ATV21.",
+        "Press a key of the keypad. LOC and REM are the switch to local control and back.",
         _key,
     ),
     "load": BenchCommand(

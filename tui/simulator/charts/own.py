@@ -8,9 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from functools import partial
 
+from tui.drive.chart import state_of
 from tui.drive.profile.schema import (
     Chart,
+    Interlock,
     Order,
     OrderId,
     Parameter,
@@ -61,6 +64,8 @@ class OwnChart:
         self._idle: State | None = None
         """State at standstill to which the line has led; None: the initial state."""
         self._pressed = False
+        self._local = False
+        """True if the drive is in local control, and ignores run commands of the line."""
         self._target_hz = 0.0
 
     def power_up(self) -> None:
@@ -123,7 +128,7 @@ class OwnChart:
 
     def _obey(self, order: Order) -> None:
         if order.id in ("forward", "reverse"):
-            if self._body.fault is None:
+            if self._body.fault is None and not self._local:
                 self._runs, self._reverse = True, order.id == "reverse"
                 self._stop = Stop.RAMP
         elif order.id == "reset":
@@ -134,7 +139,7 @@ class OwnChart:
     def _go(self, state: State) -> None:
         """Go to a state by a transition that no command names."""
         if state.kind == "running":
-            self._runs = self._body.fault is None
+            self._runs = self._body.fault is None and not self._local
         elif state.kind == "fault":
             return
         elif self._body.fault is not None:
@@ -153,8 +158,15 @@ class OwnChart:
 
     @property
     def keys(self) -> Mapping[str, Callable[[], str]]:
-        """Return no keys: those of the keypad are not simulated."""
+        """Return the switch between local and remote, if a status bit shows it."""
+        if any(chart.local is not None for chart in self._body.profile.data.charts):
+            return {"LOC": partial(self._switch, True), "REM": partial(self._switch, False)}
         return {}
+
+    def _switch(self, local: bool) -> str:
+        self._local = local
+        self._end(Stop.RAMP)
+        return "local control" if local else "control by the line"
 
     def trip(self, stop: Stop) -> None:
         """Stop the motor as the fault demands, and discard the commands of the line."""
@@ -247,6 +259,9 @@ class OwnChart:
             reached = motor.energised and abs(motor.frequency - self._target_hz) < OWN_REACHED_HZ
             self._mark(chart, chart.reached, reached)
             self._mark(chart, chart.alarm, body.alarms != 0)
+            self._mark(chart, chart.local, self._local)
+            for lock in chart.interlocks:
+                self._permit(chart, lock)
             if chart.direction is not None:
                 way = StatusBit(
                     parameter=chart.direction.parameter,
@@ -261,6 +276,19 @@ class OwnChart:
 
     def _word(self, code: str) -> int:
         return self._body.registers.present(self._body.profile[code])
+
+    def _permit(self, chart: Chart, lock: Interlock) -> None:
+        """Show that the condition of an interlock is met, in a word that the drive shows."""
+        word = self._body.registers.named(lock.parameter)
+        if word is None or word.access != "r" or lock.when:
+            return
+        raw = self._body.registers.present(word)
+        if raw & lock.mask in lock.values:
+            return
+        met = raw & ~lock.mask | lock.values[0] & lock.mask
+        words = {code: self._word(code) for code in chart.status_codes}
+        if state_of(chart, {**words, word.code: met}) is state_of(chart, words):
+            self._body.registers.put(word, met)
 
     def _mark(self, chart: Chart, mark: StatusBit | None, holds: bool) -> None:
         if mark is None or (parameter := self._body.registers.named(mark.parameter)) is None:

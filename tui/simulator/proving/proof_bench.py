@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 from tui.drive.chart import ChartState, read_chart, state_of
+from tui.drive.command_blocked import CommandBlocked, blocked_reason
 from tui.drive.errors import DriveError
 from tui.drive.orders import (
     choose,
@@ -156,6 +157,10 @@ class ProofBench:
         codes += [mark.parameter for mark in marks if mark is not None]
         codes += [option.parameter for option in chart.options]
         return self.raws([*codes, *([faults.parameter] if faults.parameter else [])])
+
+    def blocked(self, id: OrderId) -> CommandBlocked | None:
+        """Return why the panel would not send a command now; None if it would."""
+        return blocked_reason(self.profile, self.chart, id, self._known())
 
     def send(self, id: OrderId, order: Order | None = None) -> Order:
         """Send the command that the drive's state requires, as the panel does; raises Unproved."""

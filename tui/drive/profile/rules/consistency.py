@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from tui.drive.values import type_range
 
-from ..schema import Parameter, ProfileData, StatusBit
+from ..schema import Chart, Parameter, ProfileData, StatusBit
 from ..toml_lines import TomlPath
 from .meanings import QUANTITY_UNITS, SPEED_UNITS
 
@@ -85,6 +85,8 @@ def conditions_possible(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 and type_range(word)[1].bit_length() + (type_range(word)[0] < 0) <= bit
             ):
                 yield (*at, key), f"chart {chart.id}: {key}: {code} has no bit {bit}."
+            elif word is not None and (fault := _named_otherwise(chart, key, word, bit)):
+                yield (*at, key), f"chart {chart.id}: {key}: {fault}"
         for place, step in enumerate(chart.transitions):
             if step.edge_bit is not None and not (step.command or 0) >> step.edge_bit & 1:
                 yield (
@@ -102,6 +104,25 @@ def conditions_possible(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                     f"chart {chart.id}: {lock.parameter} never has a value that the interlock"
                     " allows. The motor could never run.",
                 )
+
+
+_NAMED_BY = {"local": "local", "direction": "reverse"}
+"""Word by which the texts of a bit show that the mark with this key holds."""
+
+
+def _named_otherwise(chart: Chart, key: str, word: Parameter, bit: int) -> str:
+    """Return how the texts of a bit contradict its mark; empty if they do not."""
+    named = next((row for row in word.bits if row.bit == bit), None)
+    if named is None or key not in _NAMED_BY:
+        return ""
+    off, on = (_NAMED_BY[key] in text.casefold() for text in (named.off, named.on))
+    mark = chart.local.value if key == "local" and chart.local else 1
+    if key == "direction" and chart.direction is not None:
+        mark = chart.direction.reverse
+    if off == on or on == bool(mark):
+        return ""
+    text, field = (named.on if on else named.off), "value" if key == "local" else "reverse"
+    return f"{word.code} bit {bit} is {text!r} at {int(on)}, so {field} must be {int(on)}."
 
 
 def settings_of_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
