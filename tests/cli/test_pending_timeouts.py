@@ -71,7 +71,7 @@ def test_json_has_the_timeout_in_every_command(atv21: str, command: str) -> None
 
 
 def test_warning_is_shown_if_the_command_fails(atv21: str) -> None:
-    done = ended(5, "write", atv21, "ACC=99999s", "--arm")
+    done = ended(2, "write", atv21, "ACC=99999s", "--arm")
     assert "F803 runs" in done.stderr
 
 

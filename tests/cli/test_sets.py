@@ -214,10 +214,10 @@ ROUNDED = [
 
 
 @pytest.mark.parametrize(("wanted", "text"), ROUNDED)
-def test_value_changed_much_by_rounding_exits_with_5(line: str, wanted: str, text: str) -> None:
+def test_value_changed_much_by_rounding_exits_with_2(line: str, wanted: str, text: str) -> None:
     drive = (line, "-d", "2")
     for how in ("--arm", "--dry-run"):
-        output = refused(5, "write", *drive, wanted, how)
+        output = refused(2, "write", *drive, wanted, how)
         assert text in output
         assert "--round" in output
     code = wanted.partition("=")[0]
@@ -304,19 +304,23 @@ def test_no_answer_exits_with_3(tmp_path: Path) -> None:
 
 
 WRITES_REFUSED_HERE = [
-    (("ACC=5",), "Not armed"),
-    (("ACC=100000", "--arm"), "out of range"),
-    (("RFR=5", "--arm"), "only be read"),
-    (("CMD=6", "--arm"), "is a command"),
-    (("BIR=1", "--arm"), "unverified"),
-    (("FRY=1", "--arm"), "never written by Drive Panel"),
-    (("ACC=5", "--arm", "--read-only"), "read-only"),
+    (5, ("ACC=5",), "Not armed"),
+    (2, ("ACC=100000", "--arm"), "out of range"),
+    (2, ("ACC=fast", "--arm"), "is not a number"),
+    (2, ("NOSUCH=5", "--arm"), "has no parameter"),
+    (2, ("RFR=5", "--arm"), "only be read"),
+    (2, ("CMD=6", "--arm"), "is a command"),
+    (2, ("FRY=1", "--arm"), "never written by Drive Panel"),
+    (5, ("BIR=1", "--arm"), "unverified"),
+    (5, ("ACC=5", "--arm", "--read-only"), "read-only"),
 ]
 
 
-@pytest.mark.parametrize(("arguments", "text"), WRITES_REFUSED_HERE)
-def test_refused_write_exits_with_5(arguments: tuple[str, ...], text: str) -> None:
-    assert text in refused(5, "write", "sim:atv71", *arguments)
+@pytest.mark.parametrize(("status", "arguments", "text"), WRITES_REFUSED_HERE)
+def test_bad_code_or_value_exits_with_2_and_a_state_that_forbids_it_with_5(
+    status: int, arguments: tuple[str, ...], text: str
+) -> None:
+    assert text in refused(status, "write", "sim:atv71", *arguments)
 
 
 def test_setting_written_before_a_refused_one_exits_with_6() -> None:
@@ -356,11 +360,11 @@ PAST_LIMITS = [
 
 
 @pytest.mark.parametrize(("wanted", "text"), PAST_LIMITS)
-def test_value_beyond_the_limit_of_another_parameter_exits_with_5(
+def test_value_beyond_the_limit_of_another_parameter_exits_with_2(
     wanted: tuple[str, ...], text: str
 ) -> None:
-    assert text in run(5, "write", "sim:atv71", *wanted, "--dry-run")
-    assert text in refused(5, "write", "sim:atv71", *wanted, "--arm")
+    assert text in run(2, "write", "sim:atv71", *wanted, "--dry-run")
+    assert text in refused(2, "write", "sim:atv71", *wanted, "--arm")
 
 
 def test_limit_is_raised_before_the_value_it_limits() -> None:

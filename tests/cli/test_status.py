@@ -104,15 +104,15 @@ def test_refusal_by_the_drive_exits_with_4() -> None:
         ended(0, *watch)
 
 
-@pytest.mark.parametrize("refusal", [RequestRefused, ValueRefused])
-def test_refusal_by_drivepanel_exits_with_5(refusal: type[Exception]) -> None:
+@pytest.mark.parametrize(("refusal", "status"), [(RequestRefused, 5), (ValueRefused, 2)])
+def test_refusal_exits_with_its_status(refusal: type[Exception], status: int) -> None:
     @click.command()
     @reported
     def command() -> None:
         raise refusal("ACC: 9999 is above 999.9 s.")
 
     result = CliRunner().invoke(command)
-    assert (result.exit_code, result.stdout) == (5, "")
+    assert (result.exit_code, result.stdout) == (status, "")
     assert result.stderr == "drivepanel: ACC: 9999 is above 999.9 s.\n"
 
 

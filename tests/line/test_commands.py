@@ -312,20 +312,20 @@ def test_read_only_line_is_not_written_exits_with_5(command: tuple[str, ...]) ->
 
 
 REFUSED = {
-    "interlock": ("atv31", {"LAC": 1}, ("run",), r"below L3"),
-    "channel": ("atv71", {"CD1": 0, "CHCF": 2}, ("run",), "not commanded by Modbus"),
-    "limit": ("atv71", {"HSP": 500}, ("reference", "90Hz"), "above HSP"),
-    "run at a limit": ("atv71", {"HSP": 500}, ("run", "--reference", "90Hz"), "above HSP"),
-    "no fault": ("atv71", {}, ("reset",), "No fault to reset"),
+    "interlock": (5, "atv31", {"LAC": 1}, ("run",), r"below L3"),
+    "channel": (5, "atv71", {"CD1": 0, "CHCF": 2}, ("run",), "not commanded by Modbus"),
+    "limit": (2, "atv71", {"HSP": 500}, ("reference", "90Hz"), "above HSP"),
+    "run at a limit": (2, "atv71", {"HSP": 500}, ("run", "--reference", "90Hz"), "above HSP"),
+    "no fault": (5, "atv71", {}, ("reset",), "No fault to reset"),
 }
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_refusal_by_commander_exits_with_5(case: str) -> None:
-    family, sets, command, text = REFUSED[case]
+def test_refusal_by_commander_exits_with_2_for_a_value_else_with_5(case: str) -> None:
+    status, family, sets, command, text = REFUSED[case]
     with bench(DriveSpec(family, 1, sets=sets)) as (simulation, line):
         done = drivepanel(command[0], line, *command[1:], "-p", family, "--arm")
-        assert done.returncode == 5, done.stderr
+        assert done.returncode == status, done.stderr
         assert text in done.stderr
         assert "topp" not in done.stdout
         assert stands(simulation)

@@ -120,7 +120,7 @@ def test_values_are_written_verified_and_backed_up_by_the_command_line() -> None
     wrote = CliRunner().invoke(main, ["write", *line, "FLOW=2.25", "SLIP=-2.5", "--arm"])
     assert wrote.exit_code == 0, wrote.output
     over = CliRunner().invoke(main, ["write", *line, "FLOW=10.01", "--arm"])
-    assert over.exit_code == 5, over.output
+    assert over.exit_code == 2, over.output
     assert "-5.00 m/s to 10.00 m/s" in over.output
     saved = CliRunner().invoke(main, ["backup", *line[:1], "-", *line[1:]])
     assert saved.exit_code == 0, saved.output

@@ -36,7 +36,7 @@ Default: $DRIVEPANEL_LINE.
 Exit status:
     0  done
     1  a difference was found
-    2  a usage error: an option, a file, a code or a profile
+    2  a usage error: an option, file, code, value or profile
     3  no answer, or a line error
     4  refused by the drive
     5  refused by Drive Panel: nothing was written

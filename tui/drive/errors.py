@@ -21,9 +21,5 @@ class ValueRefused(DriveError):
     """The parameter cannot hold a typed value: out of range, unknown name, or not a number."""
 
 
-class NotAValue(ValueRefused):
-    """A typed text that the parameter cannot mean, whatever the drive holds."""
-
-
-class UnitRefused(ValueRefused):
-    """A typed value in a unit that cannot be converted to the parameter's unit."""
+class ValueUndetermined(ValueRefused):
+    """A typed value that cannot be judged: what it depends on was not read, or has changed."""

@@ -12,7 +12,7 @@ from decimal import Decimal
 
 from msgspec import structs
 
-from .errors import ValueRefused
+from .errors import ValueUndetermined
 from .profile.profile import Profile
 from .profile.schema import Parameter
 from .teaching import TaughtScale
@@ -45,12 +45,12 @@ def raw_of_text(
 ) -> Conversion:
     """Encode typed text as a raw value; every write uses this, as every read uses `shown`.
 
-    Raises ValueRefused as `encode` does, and if the unit or the sign is unknown.
+    Raises ValueRefused as `encode` does, ValueUndetermined if the unit or the sign is unknown.
     """
     if parameter.unit_by is not None and (unit := profile.unit(parameter, raws)) != parameter.unit:
         if unit == "raw":
             follows = parameter.unit_by.parameter
-            raise ValueRefused(
+            raise ValueUndetermined(
                 f"{parameter.code} cannot be written: its unit depends on {follows}, which was not"
                 " read."
             )
@@ -59,7 +59,7 @@ def raw_of_text(
     found = encode(parameter, text, profile.names(parameter), scale)
     taught = profile.taught.get(parameter.code)
     if taught is not None and taught.number(found.raw) is None:
-        raise ValueRefused(
+        raise ValueUndetermined(
             f"{text} may be wrong for {parameter.code}: the sign of such values was not learned."
         )
     return found

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
 
-from .errors import NotAValue, ValueRefused
+from .errors import ValueRefused, ValueUndetermined
 from .profile.schema import Bit, Parameter
 from .units import factor_between
 from .words import (
@@ -182,7 +182,7 @@ def encode(
             source = parameter.scale_source
             text = _SCALE_NOT_READ if source else _OTHER_SCALE_NOT_READ
             text = _NO_FULL_SCALE if parameter.full_scale is not None else text
-            raise ValueRefused(text.format(code=parameter.code, source=source))
+            raise ValueUndetermined(text.format(code=parameter.code, source=source))
         number = _number(parameter, typed, names)
         counts = (number - Decimal(parameter.offset)) / scale
         raw = int(counts.to_integral_value(ROUND_HALF_UP))
@@ -248,7 +248,7 @@ def _hexadecimal(parameter: Parameter, typed: str) -> int:
     try:
         word = int(typed[3:] if typed.startswith("16#") else typed[2:], 16)
     except ValueError:
-        raise NotAValue(f"{parameter.code}: {typed!r} is not a hexadecimal word.") from None
+        raise ValueRefused(f"{parameter.code}: {typed!r} is not a hexadecimal word.") from None
     if not 0 <= word < 1 << (16 * word_count(parameter)):
         raise ValueRefused(f"{parameter.code}: {typed} does not fit {parameter.type}.")
     low, high = type_range(parameter)
@@ -272,9 +272,9 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
     if not number.is_finite():
         choice = ", ".join(list(names.values())[:4])
         if choice:
-            raise NotAValue(f"{parameter.code}: {typed!r} is not one of {choice}.")
+            raise ValueRefused(f"{parameter.code}: {typed!r} is not one of {choice}.")
         unit = parameter.unit or "counts"
-        raise NotAValue(f"{parameter.code}: {typed!r} is not a number in {unit}.")
+        raise ValueRefused(f"{parameter.code}: {typed!r} is not a number in {unit}.")
     if number and not -LONGEST_NUMBER <= number.adjusted() <= LONGEST_NUMBER:
         # its digits alone would fill the screen, or the memory
         raise ValueRefused(f"{parameter.code}: {typed[:40]!r} is out of range.")

@@ -7,7 +7,7 @@ import struct
 from collections.abc import Sequence
 from decimal import ROUND_HALF_UP, Decimal
 
-from .errors import ValueRefused
+from .errors import ValueRefused, ValueUndetermined
 from .plain import plain
 from .profile.schema import Parameter
 
@@ -102,7 +102,7 @@ def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[i
         own = parameter.mask << parameter.shift
         if held is None:
             if is_field(parameter):
-                raise ValueRefused(
+                raise ValueUndetermined(
                     f"{parameter.code} is a part of a word, and the other bits were not read."
                 )
             held = 0

@@ -116,11 +116,11 @@ def _check_usage(wanted: Wanted) -> None:
 
 
 async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> int:
-    from tui.drive.blocks.assignment import MappingError, has_blocks, no_blocks
+    from tui.drive.blocks.assignment import has_blocks, no_blocks
 
     if not has_blocks(session.profile):
         if wanted.action != "show":
-            raise MappingError(no_blocks(session.profile))
+            raise Failure(no_blocks(session.profile), REFUSED_HERE)
         await _measure_answer(session)
         show_neighbors(session, line_text, as_json=wanted.as_json)
         return DONE
@@ -257,7 +257,7 @@ def _judged(
             if wanted.dry_run and not wanted.as_json:
                 say(f"write  {change.slot}: {was} -> {will}")
     if refused:
-        raise Failure(" ".join(refused), REFUSED_HERE)
+        raise Failure(" ".join(refused), USAGE)
     return changes
 
 
@@ -275,7 +275,7 @@ async def plans_of(
     session: DriveSession, wanted: Wanted
 ) -> tuple[dict[str, int], list[Assignment]]:
     """Return the slots' contents, and the assignments requested for them."""
-    from tui.drive.blocks.assignment import MappingError, assignment, factory, place_of
+    from tui.drive.blocks.assignment import assignment, factory, place_of
     from tui.drive.blocks.picking import pick
     from tui.session.blocks.mapping import Mapper
 
@@ -296,7 +296,7 @@ async def plans_of(
         found = await mapper.slots(block)
         plan = assignment(block, found)
         if plan is None:
-            raise MappingError(f"Not every slot of {block.name} could be read.")
+            raise Failure(f"Not every slot of {block.name} could be read.", REFUSED_HERE)
         held |= plan.slots
         if wanted.action == "factory":
             plan = factory(profile, block)

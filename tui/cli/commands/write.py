@@ -14,7 +14,7 @@ from ..shared.drive_commands import (
     need_arming,
     permit_of,
 )
-from ..shared.errors import DONE, REFUSED_HERE, end_with
+from ..shared.errors import DONE, USAGE, end_with
 from ..shared.options import (
     Target,
     connect_drive,
@@ -144,10 +144,12 @@ async def _staged(
 ) -> Edits:
     """The edits against the values of the drive; remarks and consequences are reported.
 
-    Raises ValueRefused if a value would be rounded to another one without --round.
+    Raises ValueRefused if a parameter is never written as a setting, or if a value would be rounded
+    to another one without --round.
     """
     from tui.drive.errors import ValueRefused
     from tui.drive.settings.edits import consequences
+    from tui.drive.settings.writable import write_refusal
     from tui.session.settings.typed import WouldRound, stage_typed
 
     profile = session.profile
@@ -155,6 +157,10 @@ async def _staged(
     codes = [code for code, _ in pairs]
     if twice := ", ".join(code for code in dict.fromkeys(codes) if codes.count(code) > 1):
         raise click.UsageError(f"{twice}: given more than once. Which value is meant?")
+    for code in codes:
+        against = write_refusal(profile, profile[code], None)
+        if against is not None and against.reason in ("forbidden", "read-only", "order"):
+            raise ValueRefused(against.text)
     try:
         edits, retrying = await stage_typed(session, pairs, rounded=rounded)
     except WouldRound as loss:
@@ -178,7 +184,7 @@ async def _tell(session: DriveSession, edits: Edits, messages: Messages) -> tupl
         outcome: OutcomeText = "would-write" if why is None else "refused"
         rows.append(edit_field(edit, outcome=outcome, held=edit.old, text=why or text))
     found: _Written = {"results": rows, "saved": False, "after_reset": [], "unsaved": []}
-    return found, REFUSED_HERE if past else DONE
+    return found, USAGE if past else DONE
 
 
 async def _past_limits(session: DriveSession, edits: Edits) -> dict[str, str]:

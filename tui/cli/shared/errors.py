@@ -94,14 +94,16 @@ def plain_errors(*, as_json: bool) -> Iterator[None]:
 def status_of(error: Exception) -> int | None:
     """The exit status of a known error; None for an unexpected one."""
     from tui.bus.errors import DeviceException, LineError, LinkSyntaxError, RequestRefused
+    from tui.drive.blocks.assignment import MappingError
     from tui.drive.errors import (
         DriveError,
-        NotAValue,
         ProfileError,
-        UnitRefused,
         UnknownParameter,
         UnknownProfile,
+        ValueRefused,
+        ValueUndetermined,
     )
+    from tui.session.blocks.write import AssignmentRefused
     from tui.session.command.access import NotFollowed
     from tui.session.running.errors import MotorStopped, MotorTripped, NotStopped
     from tui.session.settings.write import NotTaken
@@ -112,8 +114,10 @@ def status_of(error: Exception) -> int | None:
         (UnknownProfile, USAGE),
         (UnknownParameter, USAGE),
         (ProfileError, USAGE),
-        (UnitRefused, USAGE),
-        (NotAValue, USAGE),
+        (ValueUndetermined, REFUSED_HERE),
+        (ValueRefused, USAGE),
+        (AssignmentRefused, REFUSED_HERE),
+        (MappingError, USAGE),
         (SimulatorError, USAGE),
         (RequestRefused, REFUSED_HERE),
         (NotTaken, DRIVE_REFUSED),

@@ -285,11 +285,11 @@ def status_of_results(results: Iterable[Result]) -> int:
     }
     statuses = {
         # a stop is not a line error: a script must not repeat the write automatically
-        REFUSED_HERE if r.voided else table[r.outcome]
+        REFUSED_HERE if r.voided else USAGE if r.is_beyond_limit else table[r.outcome]
         for r in results
         if r.outcome in table
     }
-    order = (LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE)
+    order = (LINE_TROUBLE, DRIVE_REFUSED, USAGE, REFUSED_HERE)
     return next((status for status in order if status in statuses), DONE)
 
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from decimal import ROUND_CEILING, ROUND_FLOOR, ROUND_HALF_UP, Decimal
 
-from tui.drive.errors import NotAValue, UnitRefused, ValueRefused
+from tui.drive.errors import ValueRefused, ValueUndetermined
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity, ScaleWhen
 from tui.drive.sentences import any_of
@@ -166,22 +166,22 @@ def convert_reference(profile: Profile, text: str, readings: Mapping[str, Shown]
     """Convert a typed reference to a raw value; a number without a unit is in the drive's unit.
 
     The motor data of the drive (pole pairs, the value of 100 %) convert between units. Raises
-    UnitRefused if the unit cannot be converted. Raises ValueRefused if the text is not a
-    reference, the drive has no word for it, or its scale was not read or has changed.
+    ValueRefused if the text is not a reference, or its unit cannot be converted. Raises
+    ValueUndetermined if the drive has no word for it, or its scale was not read or has changed.
     """
     match = _TYPED.fullmatch(text.strip())
     if match is None:
-        raise NotAValue(f"{text!r} is not a reference. Write it like 30, 30.5Hz or 900rpm.")
+        raise ValueRefused(f"{text!r} is not a reference. Write it like 30, 30.5Hz or 900rpm.")
     typed, unit = Decimal(match[1].replace(",", ".")), spelled((match[2] or "").strip())
     known = ReferenceUnits(profile, readings)
     if not reference_parameters(profile):
-        raise ValueRefused(no_place(profile, unit or "Hz"))
+        raise ValueUndetermined(no_place(profile, unit or "Hz"))
     if typed < 0:
-        raise NotAValue("A reference cannot be negative. Run reverse instead.")
+        raise ValueRefused("A reference cannot be negative. Run reverse instead.")
     parameter, number = _placed(known, text, typed, unit)
     raws, absent = known.raws, known.absent
     if refusal := other_scale(profile, raws):
-        raise ValueRefused(refusal)
+        raise ValueUndetermined(refusal)
     conversion = raw_of_text(profile, parameter, f"{number:f}", raws, absent)
     held = number_of(profile, parameter, conversion.raw, raws, absent)
     scale = profile.scale(parameter, raws, absent)
@@ -263,7 +263,7 @@ def _placed(
 ) -> tuple[Parameter, Decimal]:
     """Return the word that takes a reference in this unit, and the number in the word's unit.
 
-    Raises UnitRefused.
+    Raises ValueRefused.
     """
     places = reference_parameters(known.profile)
     if not unit:
@@ -276,7 +276,7 @@ def _placed(
         if number is not None:
             return place, number
     own = known.unit(places[0])
-    raise UnitRefused(
+    raise ValueRefused(
         f"{text!r} cannot be converted: {places[0].code} takes its reference in"
         f" {any_of(_accepted(known))}. Type it like {EXAMPLES.get(own, f'5{own}')}."
     )

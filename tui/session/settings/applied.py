@@ -40,6 +40,8 @@ class Result:
     """True if it was not sent because of a stop or the end of arming."""
     unchanged: bool = False
     """True if nothing was sent, because the drive already held the value."""
+    is_beyond_limit: bool = False
+    """True if the value contradicts a limit that another setting has."""
 
     @property
     def done(self) -> bool:

@@ -77,7 +77,8 @@ async def apply_edits(
             text = f"{edit.code} was not written yet, because {work.missed[0]} failed before it."
             result = Result(edit, EditOutcome.WAITS, text, edit.old)
         elif edit.code in reported:
-            result = Result(edit, EditOutcome.REFUSED, reported[edit.code], edit.old)
+            text = reported[edit.code]
+            result = Result(edit, EditOutcome.REFUSED, text, edit.old, is_beyond_limit=True)
         else:
             result = await work.apply(edit)
         work.results.append(result)

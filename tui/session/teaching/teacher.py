@@ -17,7 +17,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.errors import DriveError, ValueRefused, ValueUndetermined
 from tui.drive.profile.profile import Profile
 from tui.drive.sentences import all_of
 from tui.drive.small_file import read_small_text, replace_file
@@ -266,7 +266,7 @@ class Teacher:
         shown = parse_display(text, unit)
         reading = (await Reader(self.session).read([code]))[code]
         if reading.raw is None:
-            raise ValueRefused(f"{code} cannot be read: {reading.error}")
+            raise ValueUndetermined(f"{code} cannot be read: {reading.error}")
         return await asyncio.to_thread(self.take, code, reading.raw, *shown)
 
     def take(self, code: str, raw: int, shown: Decimal, unit: str) -> Lesson:
@@ -293,7 +293,8 @@ class Teacher:
         with self._lock:
             self._latest()
             if why := why_no_reference(self.family, code, self._taught_scales()):
-                raise ValueRefused(why)
+                known = reference_of(self.family, code) is not None
+                raise (ValueUndetermined if known else ValueRefused)(why)
             self._change({}, code)
         return f"{code} now takes the reference, in {self.scales[code].unit}."
 
