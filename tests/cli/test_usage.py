@@ -27,6 +27,10 @@ def test_unknown_word_is_reported() -> None:
     assert "xyzzy: no such command, and no LINE." in refused(2, "xyzzy")
 
 
+def test_command_in_place_of_a_line_is_named() -> None:
+    assert "scan is a command, not a LINE: type drivepanel scan." in refused(2, "panel", "scan")
+
+
 @pytest.mark.parametrize("line", ["tcp:10.0.0.5", "COM3", "com3,9600", "/dev/ttyX", "sim:atv71"])
 def test_line_argument_opens_the_panel(line: str) -> None:
     assert "The panel needs a terminal" in refused(2, line)

@@ -161,6 +161,8 @@ def no_such_command(name: str) -> str:
     """Return the error for a word that is neither a command nor a LINE."""
     from difflib import get_close_matches
 
+    if name in COMMANDS:  # after `panel`
+        return f"{name} is a command, not a LINE: type drivepanel {name}."
     near = get_close_matches(name.lower(), COMMANDS, n=1)
     if near:
         return f"{name}: no such command, did you mean {near[0]}?"
