@@ -22,6 +22,7 @@ from tests.sweeps import kept
 from tui.bus.errors import LineLost
 from tui.cli.shared.say import Messages
 from tui.cli.shared.sets import say_afterwards
+from tui.drive.profile import library
 from tui.drive.settings.restore_plan import RestorePlan
 from tui.drive.small_file import supplied
 from tui.session.settings.restore import plan_for
@@ -436,9 +437,17 @@ def test_steps_left_after_a_write_are_reported(
     after_reset: list[str], unsaved: list[str], saved: bool, parts: list[str]
 ) -> None:
     messages = Messages(as_json=True)
-    say_afterwards(messages, after_reset, unsaved, saved=saved)
+    say_afterwards(messages, library.load("atv312"), after_reset, unsaved, saved=saved)
     assert len(messages.texts) == len(parts)
     assert all(part in text for part, text in zip(parts, messages.texts, strict=True))
+
+
+def test_save_is_not_promised_if_the_family_has_none() -> None:
+    messages = Messages(as_json=True)
+    say_afterwards(messages, library.load("v20"), [], ["P1120"], saved=False)
+    [text] = messages.texts
+    assert text.startswith("Lost at power-off: P1120. No available document says how")
+    assert "--save" not in text
 
 
 @pytest.mark.sweep

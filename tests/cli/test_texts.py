@@ -158,10 +158,11 @@ def test_own_profile_does_not_control_terminal(
 
 def test_json_escapes_control_characters_and_keeps_all() -> None:
     bad = "\x1b\x7f\x9b\u202e\u2028\udcff\U000e0001 é →"
-    text = json_text(CheckDocument(file=bad, faults=[bad]), compact=False)
+    text = json_text(CheckDocument(file=bad, faults=[bad], hints=[]), compact=False)
     assert tame(text)
     assert "é →" in text
-    assert json.loads(text) == {"schema": 1, "command": "profiles", "file": bad, "faults": [bad]}
+    written = {"schema": 1, "command": "profiles", "file": bad, "faults": [bad], "hints": []}
+    assert json.loads(text) == written
 
 
 def test_terminal_without_symbols_shows_question_mark() -> None:

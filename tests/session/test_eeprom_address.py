@@ -92,7 +92,8 @@ def test_simulated_drive_loses_what_is_in_ram_only() -> None:
 
 def test_profile_is_proved_with_its_eeprom_addresses() -> None:
     assert [(step.title, step.fault) for step in drive_steps(installed())] == [
-        ("settings are saved at their EEPROM addresses", "")
+        ("setting ACC (Settings) is written and read back", ""),
+        ("settings are saved at their EEPROM addresses", ""),
     ]
 
 

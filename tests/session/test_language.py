@@ -282,11 +282,11 @@ CHART = {
 
 
 async def saved(
-    line: OneDrive, journal: Journal, memory: Mapping[str, object]
+    line: OneDrive, journal: Journal, memory: Mapping[str, object], access: str = "rw"
 ) -> tuple[str, list[WriteOne]]:
     profile = profile_of(
         parameter("STATE", 1, access="r"),
-        parameter("KEEP", 2),
+        parameter("KEEP", 2, access=access),
         parameter("DONE", 3, access="r"),
         functions=FUNCTIONS,
         charts=[CHART],
@@ -300,6 +300,14 @@ async def saved(
 
 async def test_save_word_may_keep_its_value(journal: Journal) -> None:
     reported, written = await saved(OneDrive({1: 0, 2: 0, 3: 0}), journal, SAVING)
+    assert "saved" in reported
+    assert written == [WriteOne(1, 2, 1)]
+
+
+async def test_save_word_may_be_write_only(journal: Journal) -> None:
+    line = OneDrive({1: 0, 2: 0, 3: 0})
+    memory = {"save": {"parameter": "KEEP", "raw": 1, "does": "Saves."}}
+    reported, written = await saved(line, journal, memory, "w")
     assert "saved" in reported
     assert written == [WriteOne(1, 2, 1)]
 

@@ -12,8 +12,10 @@ from tui.cli.main import main
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.simulator.charts.own import OwnChart
+from tui.simulator.proving.drive_steps import drive_steps
 from tui.simulator.proving.proof_bench import ProofBench
 from tui.simulator.proving.proof_steps import command_steps, prove_profile
+from tui.simulator.registers import Registers
 
 from .exchange import Exchange
 from .test_chart_own import words
@@ -103,6 +105,33 @@ def test_reset_that_has_no_effect_fails(monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(OwnChart, "reset_fault", lambda _: None)
     found = failed(library.load_file(MS300))
     assert found["reset (Fault reset) leads to its state"] == "the fault is still present after it"
+
+
+def test_reset_of_one_word_fails_at_a_second_trip(tmp_path: Path) -> None:
+    """Its bit stays set, so the second time it has no edge."""
+    path, text = tmp_path / "own.toml", MS300.read_text("utf-8")
+    right = 'parameter = "RESET", words = [0x0002]'
+    for sequence, fault in (
+        ("[0x0081]", "a second trip: the fault is still present after it. Its words have no edge"),
+        ("[0x0001, 0x0081, 0x0001]", ""),
+    ):
+        path.write_text(text.replace(right, f"words = {sequence}"), "utf-8")
+        found = {step.title: step.fault for step in command_steps(library.load_file(path))}
+        assert found["reset (Fault reset) leads to its state"].startswith(fault)
+        assert bool(found["reset (Fault reset) leads to its state"]) == bool(fault)
+
+
+def test_setting_that_is_not_held_fails(monkeypatch: pytest.MonkeyPatch) -> None:
+    profile, written = library.load_file(MS300), Registers.write_word
+
+    def keep_fmax(registers: Registers, address: int, word: int) -> None:
+        if address != profile["FMAX"].address:
+            written(registers, address, word)
+
+    monkeypatch.setattr(Registers, "write_word", keep_fmax)
+    found = {step.title: step.fault for step in drive_steps(profile)}
+    assert found["setting FMAX (Settings) is written and read back"].startswith("it is ")
+    assert found["setting 09-02 (Communication) is written and read back"] == ""
 
 
 def test_run_of_the_wrong_way_fails(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -331,7 +331,7 @@ async def _restore(
         saved = save and done.complete
         if saved:
             messages.tell(await save_to_eeprom(session, journal, permit, gate))
-        say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
+        say_afterwards(messages, session.profile, done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
         text = _WROTE if written else _WROTE_NOTHING
         messages.tell(text.format(count=written, left=len(done.left)))

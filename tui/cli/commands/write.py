@@ -231,7 +231,7 @@ async def _write(
         saved = save and len(done.written) == len(done.results) and not done.stopped
         if saved:
             messages.tell(await save_to_eeprom(session, journal, permit, gate))
-        say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
+        say_afterwards(messages, session.profile, done.after_reset, done.unsaved, saved=saved)
     finally:
         close_journal(journal)
     found: _Written = {

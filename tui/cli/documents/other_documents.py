@@ -196,6 +196,8 @@ class CheckDocument(Document, kw_only=True):
     command: Literal["profiles"] = "profiles"
     file: str
     faults: list[str]
+    hints: list[str]
+    """Probable mistakes of a file without faults."""
 
 
 class ProofStepField(DocumentPart, kw_only=True):

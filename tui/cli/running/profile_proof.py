@@ -34,14 +34,22 @@ def check_files(files: list[Path], as_json: bool) -> None:
 
     found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
     found |= {path: shared_identification(path) for path, faults in found.items() if not faults}
+    hints = {path: [] if faults else library.hints_of(path) for path, faults in found.items()}
     if as_json:
-        print_json([CheckDocument(file=str(path), faults=some) for path, some in found.items()])
+        print_json(
+            [
+                CheckDocument(file=str(path), faults=some, hints=hints[path])
+                for path, some in found.items()
+            ]
+        )
     else:
         for path, faults in found.items():
             if not faults:
                 checked = library.load_file(path)
                 count = len(checked.parameters)
                 say(f"{path}: {checked.name}, {count} parameters, no fault found.")
+                for hint in hints[path]:
+                    say(f"hint: {hint}")
     faults = [fault for some in found.values() for fault in some]
     if faults:
         if as_json:

@@ -28,6 +28,7 @@ from .say import Messages, say_over
 from .standard_streams import STANDARD, given_file
 
 if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
     from tui.drive.settings.edits import Edit
     from tui.drive.settings.parameter_set import ParameterSet
     from tui.session.connect.open_line import OpenLine
@@ -294,10 +295,23 @@ def status_of_results(results: Iterable[Result]) -> int:
 
 
 def say_afterwards(
-    messages: Messages, after_reset: Iterable[str], unsaved: Sequence[str], *, saved: bool
+    messages: Messages,
+    profile: Profile,
+    after_reset: Iterable[str],
+    unsaved: Sequence[str],
+    *,
+    saved: bool,
 ) -> None:
     """Report what a person must know after a write."""
     if waiting := ", ".join(after_reset):
         messages.tell(f"In force only after the next reset of the drive: {waiting}.")
     if unsaved and not saved:
-        messages.tell("Lost at power-off until they are saved: --save does that, motor stopped.")
+        from tui.drive.settings.memory_orders import MemoryRefused, save_effect
+
+        try:
+            save_effect(profile, unsaved)
+        except MemoryRefused as refused:
+            messages.tell(f"Lost at power-off: {', '.join(unsaved)}. {refused}")
+        else:
+            text = "Lost at power-off until they are saved: --save does that, motor stopped."
+            messages.tell(text)

@@ -15,6 +15,7 @@ from .address_rule import fill_addresses
 from .converting import converted
 from .form import form_faults, place_label
 from .rules import RULES
+from .rules.hints import HINT_RULES
 from .schema import ProfileData
 from .shared_rows import ProfileTables, read_tables
 from .toml_lines import TomlPath
@@ -63,6 +64,15 @@ def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[Profi
     except msgspec.ValidationError:
         return None, _faults_of_form(sources)
     return data, _in_order(_placed(sources, _broken_rules(data)))
+
+
+def hints_in(path: Path, packaged: Path) -> list[ProfileFault]:
+    """Return the probable mistakes of a profile without faults, by line. Raises ProfileError."""
+    sources = read_tables(path, packaged)
+    fill_addresses(sources.tables)
+    data: ProfileData = converted(sources.tables, ProfileData)
+    found = [hint for rule in HINT_RULES for hint in rule(data, sources.tables)]
+    return _in_order(_placed(sources, found))
 
 
 def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:

@@ -219,6 +219,13 @@ def all_faults_of(path: Path) -> list[str]:
     return reported
 
 
+def hints_of(path: Path) -> list[str]:
+    """Return the probable mistakes of a profile file without faults, with file and line."""
+    from .check import hints_in
+
+    return [str(hint) for hint in hints_in(path, packaged_folder())]
+
+
 def faults_of(path: Path) -> list[str]:
     """Return all faults of a profile file, with file and line; empty if it can be used."""
     from .check import examined

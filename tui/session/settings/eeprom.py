@@ -189,14 +189,18 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
     profile = retrying.session.profile
     status = profile.quantity("extended_status_word")
     reported = [order.done.parameter] if order.done else []
-    codes = [order.parameter, *([status.code] if status else []), *reported]
+    own = [] if profile[order.parameter].access == "w" else [order.parameter]
+    # a word that can only be written shows nothing: then an answer of the drive is enough
+    codes = [*own, *([status.code] if status else []), *reported] or profile.data.status_codes
+    if not codes:
+        return
     end = retrying.session.clock.monotonic() + SAVING_LONGEST
     while retrying.session.clock.monotonic() < end:
         try:
             raws = await retrying.ask_raws(codes)
         except NoAnswer:
             raws = {}  # a drive that is busy with its memory may not answer for a moment
-        pending = _is_pending(order, raws)
+        pending = (bool(own) or order.done is not None) and _is_pending(order, raws)
         known = status is not None and not retrying.why_absent(status.code)
         busy = profile.data.memory.busy_mask
         word = raws.get(status.code, busy) if status is not None and known else 0

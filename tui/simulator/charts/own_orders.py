@@ -76,7 +76,14 @@ class OwnOrders:
                 done = order
         if done is not None and locked_by(chart, done.id, raws) is not None:
             return None
-        return done
+        return None if done is not None and self._lacks_edge(chart, done, where, raw) else done
+
+    def _lacks_edge(self, chart: Chart, order: Order, where: Parameter, raw: int) -> bool:
+        """Return True for a reset in the command word whose bits were already set before."""
+        own = bool(chart.command) and self._profile[chart.command] is where
+        if order.id != "reset" or len(order.words) > 1 or not own:
+            return False
+        return not unsigned(raw) & ~self._last.get(where.code, 0)
 
     def _waited(self, order: Order, come: int, place: int, state: State) -> bool:
         """Return True if the wait before the next word of a command is over."""

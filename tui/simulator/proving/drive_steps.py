@@ -11,6 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.settings.memory_orders import eeprom_copy
+from tui.drive.settings.writable import is_setting
 from tui.drive.values import is_enumeration, is_field, raw_range, word_count
 
 from .bench_motion import STOP_SECONDS, need_reset, present_scale, running_chart, start_motor
@@ -19,6 +20,7 @@ from .proof_bench import ProofBench, ProofStep, Unproved, proof_step
 
 def drive_steps(profile: Profile) -> Iterator[ProofStep]:
     """Test the reactions to communication loss, the memory and the blocks."""
+    yield from _settings(profile)
     yield from _timeouts(profile)
     yield from _memory(profile)
     yield from _blocks(profile)
@@ -79,6 +81,45 @@ def _need_no_trip(bench: ProofBench, *, runs: bool, keeps: bool) -> None:
         raise Unproved("the motor does not turn any more")
     if bench.state().kind == "fault":
         raise Unproved("the drive is in fault")
+
+
+LINE_QUANTITIES = frozenset({"line_address", "line_baud", "line_format"})
+"""Settings that would end the exchange with the drive on the bench."""
+
+
+def _settings(profile: Profile) -> Iterator[ProofStep]:
+    """Write a setting of each group and kind of storage, and read it back."""
+    line = {setting.parameter for setting in profile.data.link.settings}
+    kinds: set[tuple[str, str, int]] = set()
+    bench = ProofBench(profile, None)
+    for index, parameter in enumerate(profile.parameters):
+        kind = (parameter.group, parameter.storage, word_count(parameter))
+        cuts = parameter.code in line or parameter.quantity in LINE_QUANTITIES
+        fits = is_setting(profile, parameter) and not cuts
+        if not fits or parameter.forbidden or parameter.resets_others or kind in kinds:
+            continue
+        if next(_others(profile, parameter), None) is not None:
+            kinds.add(kind)
+            title = f"setting {parameter.code} ({parameter.group}) is written and read back"
+            step = partial(_write_setting, bench, parameter)
+            yield proof_step(("parameters", index), title, step)
+
+
+def _write_setting(bench: ProofBench, setting: Parameter) -> None:
+    """Write values near the present one and the limits, until one is held; else raise Unproved."""
+    present, (low, high) = bench.read(setting), raw_range(setting)
+    near = [*_others(bench.profile, setting), present + 1, present - 1, high]
+    fault = "no value within its limits differs from the present one"
+    for raw in dict.fromkeys(raw for raw in near if low <= raw <= high and raw != present):
+        try:
+            bench.write(setting, raw)
+        except Unproved as error:
+            fault = f"{raw} is refused: {error}"
+            continue
+        if (read := bench.read(setting)) == raw:
+            return
+        fault = f"it is {read} after {raw} was written"
+    raise Unproved(fault)
 
 
 def _memory(profile: Profile) -> Iterator[ProofStep]:

@@ -104,6 +104,13 @@ def references_usable(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         if feedback is not None and feedback.access == "w":
             at: TomlPath = ("references", index, "feedback")
             yield at, f"reference: its feedback {listed.feedback} cannot be read."
+        word = parameters.get(listed.parameter)
+        if listed.signed and word is not None and word.type.startswith("uint"):
+            yield (
+                ("references", index, "signed"),
+                f"reference {word.code} is signed, but {word.type} has no negative value. Use"
+                f" {word.type.removeprefix('u')}.",
+            )
     runs = any(order.id in RUN_ORDERS for chart in data.charts for order in chart.orders)
     for at, way, parameter in reference_ways(data):
         if at[0] == "parameters" and not runs:
@@ -257,6 +264,16 @@ def writable_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         parameter = parameters.get(code)
         if parameter is not None and (parameter.access == "r" or parameter.forbidden):
             yield at, f"{code} cannot be written."
+    for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
+        word = parameters.get(order.parameter) if order is not None else None
+        if order is None or word is None:
+            continue
+        if order.bit and word.access == "w":
+            text = f"{word.code} cannot be read (access w), so its other bits cannot be kept."
+            yield ("memory", key, "bit"), f"{text} Delete bit."
+        shown = parameters.get(order.done.parameter) if order.done is not None else None
+        if shown is not None and shown.access == "w":
+            yield ("memory", key, "done"), f"{shown.code} cannot be read (access w)."
 
 
 def readable_pairs(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
