@@ -197,6 +197,10 @@ async def test_stop_by_the_test_itself_is_no_failure(monkeypatch: pytest.MonkeyP
         await asyncio.sleep(0.05)
 
     await rig.run(stop)
+    rig = Rig(monkeypatch)
+    rig.error_after = 0.02  # it trips during that stop
+    with pytest.raises(MotorTripped):
+        await rig.run(stop)
 
 
 # Ends by others

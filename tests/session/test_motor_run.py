@@ -39,6 +39,8 @@ class Rig:
         self.after_stop: Callable[[], None] = lambda: None
         self.after_sleep: Callable[[], None] = lambda: None
         self.states = list(states or [state()])
+        self.kind_read = "ready"
+        """The kind of state that the stop has read last."""
         self.hertz: float | None = 20.0
         self.error = ""
         self.cycle = 0
@@ -53,6 +55,7 @@ class Rig:
         frequency = SimpleNamespace(code="HZ")
         session = SimpleNamespace(
             device=1, work=self.work, followed=("CMD",),
+            state=lambda _: SimpleNamespace(kind=self.kind_read),
             profile=SimpleNamespace(quantity=lambda _: frequency),
         )  # fmt: skip
         given = SimpleNamespace(changed_words=lambda: self.lost_words)
@@ -245,6 +248,43 @@ async def test_trip_names_its_fault_at_the_first_cycle_of_an_ended_run(
         " fault."
     )
     assert len(rig.shown) == 1
+
+
+@pytest.mark.parametrize(
+    ("named", "text"),
+    [("OCF", "Device 1 tripped: OCF, Overcurrent."), ("", "Device 1 tripped: It is fault.")],
+)
+@pytest.mark.parametrize("accepted", [True, False])
+async def test_trip_while_it_is_stopped_is_an_error_and_no_usual_stop(
+    named: str, text: str, accepted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rig = Rig(monkeypatch)
+    rig.run.seconds = 1.0
+    if not accepted:
+        rig.results, rig.hertz = [NOT_STOPPED], 0.0
+    fault = SimpleNamespace(code=named, name="Overcurrent") if named else None
+
+    def trips() -> None:
+        # the stop reads the state before the monitor reads the name of the fault
+        rig.kind_read = "fault"
+        rig.states = [state("fault"), state("fault"), state("fault", fault=fault)]
+
+    rig.after_stop = trips
+    with pytest.raises(MotorTripped) as caught:
+        await rig.run.carry_out()
+    assert str(caught.value).startswith(text)
+    assert rig.events == [("stopping", "stopping (after 1 s)"), ("ended", str(caught.value))]
+
+
+async def test_trip_that_has_ended_the_run_is_reported_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    fault = SimpleNamespace(code="OCF", name="Overcurrent")
+    rig = Rig(monkeypatch, state("fault", fault=fault))
+    rig.kind_read = "fault"
+    with pytest.raises(MotorTripped):
+        await rig.run.carry_out()
+    assert [event for event, _ in rig.events] == ["ended", "stopping", "stopped"]
 
 
 @pytest.mark.parametrize(

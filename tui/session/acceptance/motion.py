@@ -23,7 +23,7 @@ from ..console import DriveConsole
 from ..fleet import Fleet
 from ..monitor.snapshot import Snapshot
 from ..running.ending import Ending
-from ..running.errors import MotorStopped, NotStopped
+from ..running.errors import MotorStopped, MotorTripped, NotStopped
 from ..running.motor_run import MotorRun, RunEvent
 from ..running.watching import latest_of, outcome_or_error
 from ..work import Permit
@@ -189,7 +189,9 @@ class MotionBench:
         self.check()
         if not early and not working.cancelled() and (failed := working.exception()) is not None:
             raise failed
-        own = isinstance(error, MotorStopped) and self._own_stop
+        # a trip during a stop of the test fails it, too
+        own = isinstance(error, MotorStopped) and not isinstance(error, MotorTripped)
+        own = own and self._own_stop
         if error is not None and not own:
             raise error
         if early:

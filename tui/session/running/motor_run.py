@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 from tui.bus.errors import LineError
+from tui.safety import STATE_FRESH
 
 from ..command.stop_report import Phase
 from ..console import DriveConsole
@@ -27,6 +28,8 @@ RUN_POLL_INTERVAL = 0.05
 CYCLES_AT_REST = 2
 """Cycles in a row that show a motor at rest before it counts as stopped on its own."""
 UNNAMED_SOURCE = "another source"
+FAULT_NAMED_WITHIN = 1.0
+"""Seconds after a trip in which the monitor reads the name of the fault."""
 STOPS_THAT_MAY_FAIL = 2
 """Stops that may fail on a line without trouble before the motor is reported as running."""
 
@@ -71,6 +74,8 @@ class MotorRun:
     """True if the run command is on its way, so that it may be sent at any time."""
     _earlier: tuple[Entry, ...] = field(init=False)
     _stops: int = field(init=False)
+    _has_ended: bool = field(default=False, init=False)
+    """True if it was reported that the motor stopped on its own."""
     _warned: bool = field(default=False, init=False)
     """True if it was reported that the motor does not stop."""
 
@@ -156,6 +161,7 @@ class MotorRun:
                 with suppress(LineError):
                     await self.console.read(self.console.session.followed)
                 stopped = self._stopped_on_its_own(latest)
+                self._has_ended = True
                 self.observer.report("ended", str(stopped))
                 raise stopped
             if ended:
@@ -187,11 +193,8 @@ class MotorRun:
 
     def _stopped_on_its_own(self, latest: Snapshot) -> MotorStopped:
         """Return the error with the reason why the motor no longer runs."""
-        if fault := latest.state.fault:
-            return MotorTripped(
-                f"Device {self.console.device} tripped: {fault.code}, {fault.name}. Check the"
-                " machine, remove the cause, then reset the fault."
-            )
+        if latest.state.fault:
+            return self._tripped(latest)
         text = "It was stopped by the drive or by another source."
         if by_others := self._stop_of_others():
             text = f"It was stopped by {by_others}."
@@ -201,6 +204,15 @@ class MotorRun:
             text = "It was stopped at its terminals or keypad."
         state = latest.state.headline
         return MotorStopped(f"Device {self.console.device} no longer runs: {state}. {text}")
+
+    def _tripped(self, latest: Snapshot) -> MotorTripped:
+        """Return the error of a trip, with its fault if that is known."""
+        fault = latest.state.fault
+        named = f"{fault.code}, {fault.name}" if fault else latest.state.headline
+        return MotorTripped(
+            f"Device {self.console.device} tripped: {named}. Check the machine, remove the cause,"
+            " then reset the fault."
+        )
 
     async def _bring_to_rest(self) -> None:
         """Stop the motor and wait for standstill; on a lost line, as soon as it is connected again.
@@ -218,10 +230,12 @@ class MotorRun:
                     self._warn()
             report = stopper.reports[session.device]
             if report.phase is Phase.STOPPED:
+                await self._check_trip()
                 self.observer.report("stopped", f"Device {session.device}: stopped.")
                 return
             bad = await self._line_was_bad(ordered)
             if self._stands():
+                await self._check_trip()
                 self.observer.report("stopped", f"Device {session.device} is at standstill.")
                 return
             # a ramp may take longer than a stop is monitored
@@ -229,6 +243,21 @@ class MotorRun:
                 failed += 1
             if failed == STOPS_THAT_MAY_FAIL:
                 raise NotStopped(f"Device {session.device}: {report.text}")
+
+    async def _check_trip(self) -> None:
+        """Raise MotorTripped if the drive tripped while it was stopped.
+
+        The stop has just read the state; the name of the fault comes with the next cycle.
+        """
+        if self._has_ended or self.console.session.state(STATE_FRESH).kind != "fault":
+            return
+        since, latest = time.monotonic(), latest_of(self.console)
+        while latest.state.fault is None and time.monotonic() - since < FAULT_NAMED_WITHIN:
+            await asyncio.sleep(RUN_POLL_INTERVAL)
+            latest = latest_of(self.console)
+        tripped = self._tripped(latest)
+        self.observer.report("ended", str(tripped))
+        raise tripped
 
     def _warn(self) -> None:
         """Report once that a silent drive was not stopped yet, and what happens now."""
