@@ -352,3 +352,30 @@ async def test_broken_own_profile_does_not_end_a_scan() -> None:
     finally:
         opened.close()
     assert [r.identity.candidates[0] for r in results if r.identity] == ["atv71", "powerdrive"]
+
+
+async def test_search_names_the_addresses_that_it_has_not_probed_yet() -> None:
+    line = Replies({2, 4})
+    search = Search(range(1, 6), line.no_time)
+    unprobed: list[tuple[int, ...]] = [search.unprobed]
+
+    async def found(_: ScanResult) -> None:
+        unprobed.append(search.unprobed)
+
+    await search.run(cast("ModbusLine", line), found)
+    assert unprobed == [(1, 2, 3, 4, 5), (2, 3, 4, 5), (4, 5)]
+    assert search.unprobed == ()
+
+
+async def test_search_for_motors_to_stop_leaves_no_pauses_for_polling() -> None:
+    rests: list[float] = []
+
+    async def rest(seconds: float) -> None:
+        rests.append(seconds)
+
+    line = Replies(set(), link=TcpLink("127.0.0.1"))
+    line.pace.claim("a monitor", 1, 0.1, 0.5)
+    search = Search([1, 2], rest)
+    search.stops_found = True
+    await searched(search, line)
+    assert rests == []

@@ -15,6 +15,8 @@ from tui.bus.errors import NoAnswer
 from tui.drive.profile import library
 from tui.drive.profile.check import examined
 from tui.session.command.access import HalfSent
+from tui.session.command.stop_report import OVER, Phase
+from tui.session.fleet import Fleet
 from tui.session.running.watching import outcome_of
 from tui.session.work import OutcomeKind
 from tui.simulator.proving.proof_bench import ProofBench
@@ -138,6 +140,32 @@ async def test_lost_reply_in_a_sequence_ends_it_with_a_stop(
         assert commands(made) == sent
         assert made.commander.outcome is not None
         assert isinstance(made.commander.outcome.error, HalfSent)
+
+
+@pytest.mark.parametrize("runs", [True, False])
+async def test_motor_is_followed_to_its_standstill_after_half_of_a_command(runs: bool) -> None:
+    async with primed('{ states = ["primed"], ms = 300 }') as made:
+        fleet = Fleet(made.line, made.console.journal, clock=made.clock)
+        fleet.take(made.session)
+        made.drive.set("STAT", 2 if runs else 1)
+        made.drive.set("FREQ", 200 if runs else 0)
+        made.commander.run("forward", "20Hz")
+        assert "ended after word 1 of 2" in await made.done(OutcomeKind.REFUSED)
+
+        def is_over() -> bool:
+            report = fleet.stopper.reports.get(1)
+            return report is not None and report.phase in OVER
+
+        await made.let_go_until(is_over)
+        report, texts = fleet.stopper.reports[1], [event.text for event in fleet.events.events]
+        assert not made.session.arming.armed
+        assert "ended after word 1 of 2" in texts[0]
+        if runs:
+            assert report.text.startswith("NOT STOPPED: it answers and runs on")
+            assert texts[1:] == [report.text]
+        else:
+            assert report.phase is Phase.STOPPED
+            assert texts[1:] == [], "the reason stays the newest message"
 
 
 @pytest.mark.parametrize("waits", ['{ states = ["primed"] }', "{ ms = 200 }", "{}"])

@@ -8,6 +8,7 @@ import pkgutil
 import sys
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,12 +16,21 @@ from textual.events import Key, Paste
 from textual.widgets import Input
 
 from tui.app import DrivePanelApp
+from tui.bus.fake import FakeLine
 from tui.bus.shared_state import SharedState
 from tui.screens.base import PanelScreen
+from tui.screens.connection.scanning import UNPROBED
 from tui.screens.dialogs.ask import Ask
-from tui.screens.key_dispatcher import NOBODY_TO_STOP
+from tui.screens.key_dispatcher import NOBODY_TO_STOP, SCAN_STOPS
 from tui.session.command.commander import Commander
-from tui.session.fleet import FoundDrive
+from tui.session.command.stop_report import Phase
+from tui.session.connect.identify import DriveIdentity, ScanResult
+from tui.session.connect.open_line import demo_line
+from tui.session.connect.search import Search
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
+from tui.session.fleet import Fleet, FoundDrive
+from tui.session.journal import Journal
 from tui.terminal.reader import KeyReader
 from tui.terminal.stroke import Stroke, attach
 from tui.terminal.type_ahead import PASTE_IGNORED
@@ -309,3 +319,57 @@ async def test_not_stopped_message_is_never_covered() -> None:
                 assert not made.app._notifications
         made.drive().set_input("LI1", "0")
         await until(made.pilot, lambda: "NOT STOPPED" not in picture(made.app))
+
+
+async def test_stop_of_all_during_a_scan_stops_drives_that_it_finds_afterwards(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    take = Fleet.take
+
+    def take_and_stop(self: Fleet, session: DriveSession, *found: Any, **how: Any) -> DriveConsole:
+        console = take(self, session, *found, **how)
+        if session.device == 1:
+            assert app.take_stop_key("f9")  # only this drive is known yet
+        return console
+
+    monkeypatch.setattr(Fleet, "take", take_and_stop)
+    opened = demo_line({"atv71": 30.0, "atv312": 30.0})
+    app = DrivePanelApp(open_line=lambda *_, **__: opened, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.fleet is not None and len(app.fleet.stopper.reports) == 2)
+        assert app.fleet is not None
+        texts = [event.text for event in app.events.events]
+        assert any(text.startswith(f"{SCAN_STOPS} Addresses not reached yet: ") for text in texts)
+        stopper = app.fleet.stopper
+        await until(pilot, lambda: stopper.reports[2].phase in (Phase.STOPPING, Phase.STOPPED))
+        assert app.fleet.search is not None
+        await until(pilot, lambda: app.fleet.search.ended == "done")  # type: ignore[union-attr]
+        assert not [event for event in app.events.events if "No stop was sent" in event.text]
+
+
+async def test_scan_that_ends_early_after_a_stop_of_all_names_what_it_has_not_reached() -> None:
+    app = app_of()
+    async with app.run_test():
+        search = Search(range(1, 32))
+        app.connection._report_unprobed(search)
+        assert app.events.newest is None, "nobody has stopped all"
+        search.stops_found, search._probed = True, 11
+        app.connection._report_unprobed(search)
+        assert app.events.newest is not None
+        assert app.events.newest.text == UNPROBED.format("12-31")
+
+
+async def test_drive_found_without_a_profile_after_a_stop_of_all_is_reported() -> None:
+    app = app_of()
+    async with app.run_test():
+        app.fleet = fleet = Fleet(FakeLine(), Journal(Path()))
+        fleet.search = Search(range(1, 10))
+        unknown = DriveIdentity(5, "", "", "", "", None, ())
+        await app.connection._take(ScanResult(5, unknown))
+        assert not app.unreached[0]
+        fleet.search.stops_found = True
+        await app.connection._take(ScanResult(5, unknown))
+        assert app.unreached[0].startswith("NOT STOPPED: device 5, not identified.")
+        await app.connection._take(ScanResult(6, None, "Damaged."))
+        assert app.events.newest is not None
+        assert "It was sent no stop." in app.events.newest.text

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from tui.terminal.lean_app import LeanApp
@@ -202,3 +202,16 @@ class Panel(LeanApp):
     def tell(self, text: str) -> None:
         """Say why a key did nothing."""
         self.events.add("told", text)
+
+
+UNREACHED = (
+    "NOT STOPPED: device {}, not identified. Stop it at the machine, or enter its profile on Line"
+    " and press s."
+)
+
+
+def tell_unreached(panel: Panel, devices: Sequence[int]) -> None:
+    """Report drives that a stop of all does not reach, over every screen."""
+    text = UNREACHED.format(", ".join(map(str, devices)))
+    panel.events.add("failed", text)
+    panel.unreached = text, panel.panel_clock.monotonic()

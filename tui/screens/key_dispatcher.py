@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
@@ -19,7 +19,7 @@ from tui.terminal.stroke import stroke_of
 from tui.widgets.replay_bar import NO_MOTOR
 from tui.widgets.small import is_too_small
 
-from .app_port import Panel
+from .app_port import Panel, tell_unreached
 from .harmless_keys import HarmlessKeys
 from .keys.action import CONNECTION, LINE_ONLY_IN_REPLAY, NOT_IN_REPLAY
 from .keys.table import STOPS_ALL, STOPS_LIVE, STOPS_NONE
@@ -44,10 +44,8 @@ NOBODY_TO_STOP = "Nothing was stopped: no drive is known."
 NOBODY_IN_REPLAY = "Nothing was stopped: this is a replay, and no line is open."
 LIVE_STOPPED = "Stopping all drives of the live lines. The drives on this screen are a replay."
 NO_COMMAND_IN_REPLAY = "This is a replay: nothing is sent to a drive."
-UNREACHED = (
-    "NOT STOPPED: device {}, not identified. Stop it at the machine, or enter its profile on Line"
-    " and press s."
-)
+SCAN_STOPS = "Stopping all drives. The scan goes on, and stops each drive that it finds."
+NOT_REACHED_YET = f"{SCAN_STOPS} Addresses not reached yet: {{}}."
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
 TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it again."
@@ -183,6 +181,8 @@ class KeyDispatcher(HarmlessKeys):
         for fleet in every_fleet(self):
             try:
                 if chosen is None:
+                    # first: a drive found from now on is stopped by the scan, others here
+                    carried_on(partial(_stop_found, fleet))
                     self._stop_sessions(fleet, fleet.sessions)
                 elif chosen in fleet.consoles:
                     self._stop_sessions(fleet, [chosen.session])
@@ -196,14 +196,14 @@ class KeyDispatcher(HarmlessKeys):
         if self.hearing:
             carried_on(lambda: soon_in_loop(self, self._warn, NO_STOP_HERE))
         elif chosen is None:
-            carried_on(lambda: soon_in_loop(self, self._tell_unreached, others))
+            carried_on(lambda: soon_in_loop(self, self._tell_stop_of_all, others))
 
     def _warn(self, text: str) -> None:
         """Report on every screen that a stop has stopped nothing."""
         self.notify(text, severity="warning")
 
-    def _tell_unreached(self, others: Mapping[Fleet, Collection[int]]) -> None:
-        """Report drives that a stop of all did not reach, or that there is no drive.
+    def _tell_stop_of_all(self, others: Mapping[Fleet, Collection[int]]) -> None:
+        """Report what a stop of all does not reach, or not yet, or that there is no drive.
 
         `others` are drives of other programs, which the holder of the line stops.
         """
@@ -213,15 +213,17 @@ class KeyDispatcher(HarmlessKeys):
             for device in fleet.strangers
             if device not in others.get(fleet, ())
         ]
-        if not strangers:
-            if not any(others.values()) and not any(fleet.sessions for fleet in self.live_fleets):
-                self._warn(NOBODY_IN_REPLAY if self.replay is not None else NOBODY_TO_STOP)
-            elif self.replay is not None:
-                self._warn(LIVE_STOPPED)
-        else:
-            text = UNREACHED.format(", ".join(map(str, strangers)))
-            self.events.add("failed", text)
-            self.unreached = text, self.panel_clock.monotonic()
+        if strangers:
+            tell_unreached(self, strangers)
+        searches = [fleet.search for fleet in self.live_fleets if fleet.search is not None]
+        if scans := [search for search in searches if search.is_stopping]:
+            self._warn(_scan_text([device for scan in scans for device in scan.unprobed]))
+        elif strangers:
+            return
+        elif not any(others.values()) and not any(fleet.sessions for fleet in self.live_fleets):
+            self._warn(NOBODY_IN_REPLAY if self.replay is not None else NOBODY_TO_STOP)
+        elif self.replay is not None:
+            self._warn(LIVE_STOPPED)
 
     def _stop_sessions(
         self, fleet: Fleet, sessions: list[DriveSession], order: OrderId = "stop"
@@ -318,6 +320,19 @@ class KeyDispatcher(HarmlessKeys):
         if self.replay is not None:
             return STOPS_LIVE if self.live_fleets else NO_MOTOR
         return f"STOP {chosen.device}" if chosen is not None else STOPS_ALL
+
+
+def _stop_found(fleet: Fleet) -> None:
+    """Have a scan in progress stop each drive that it finds from now on."""
+    if fleet.search is not None:
+        fleet.search.stops_found = True
+
+
+def _scan_text(unprobed: Sequence[int]) -> str:
+    """Return the report on a stop of all during a scan, with the addresses not probed yet."""
+    from tui.session.connect.addresses import addresses_text
+
+    return NOT_REACHED_YET.format(addresses_text(unprobed)) if unprobed else SCAN_STOPS
 
 
 def _stop_others(fleet: Fleet, stopped: dict[Fleet, Collection[int]]) -> None:

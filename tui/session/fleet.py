@@ -21,6 +21,7 @@ from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 
 from .clock import REAL_CLOCK, Clock
+from .command.access import HalfSent
 from .command.stop import Stopper
 from .connect.identify import DriveIdentity
 from .connect.prepared_stop import prepared_stop
@@ -44,6 +45,9 @@ log = logging.getLogger(__name__)
 
 PROGRAM_ENDS_WITHIN = 0.3
 """Seconds after which the process of a program that has left the line no longer exists."""
+
+HALF_SENT = "Drive Panel, after half of a command"
+"""Source of a stop after a command of several words that ended before its last one."""
 
 Stamp = Mapping[int, int]
 """The stop count of each drive at the moment when something was typed."""
@@ -151,7 +155,7 @@ class Fleet:
             return before
         session.guessed = guessed
         session.starts = self.starts
-        session.work.on_report = partial(self._note_outcome, session.device)
+        session.work.on_report = partial(self._note_outcome, session)
         session.byte_order.on_swapped = partial(self.events.add, "failed", device=session.device)
         console = DriveConsole(session, self.journal)
         stated = identity or session.known_identity
@@ -165,6 +169,9 @@ class Fleet:
         threading.Thread(
             target=self._recall, args=(console,), name="last start", daemon=True
         ).start()
+        if self.search is not None and self.search.is_stopping:
+            with suppress(LineClosed):
+                self.stop([session])
         return console
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
@@ -216,9 +223,13 @@ class Fleet:
         for session in self.sessions:
             await asyncio.to_thread(starts.look, session)
 
-    def _note_outcome(self, device: int, outcome: Outcome) -> None:
+    def _note_outcome(self, session: DriveSession, outcome: Outcome) -> None:
+        """Report the result of work; after half of a command, see the motor to its standstill."""
         if outcome.kind is not OutcomeKind.WORKING:
-            self.events.add(outcome.kind, outcome.text, device)
+            self.events.add(outcome.kind, outcome.text, session.device)
+        if isinstance(outcome.error, HalfSent) and outcome.error.needs_stop:
+            with suppress(LineClosed):
+                self.stopper.stop([session], by=HALF_SENT, quiet=True)
 
     def _note_fault(self, device: int, latest: Snapshot) -> None:
         """Keep when a drive went into its fault; called in the line's thread."""

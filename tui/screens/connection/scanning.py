@@ -14,6 +14,7 @@ from textual.widgets import Input
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
+from ..app_port import tell_unreached
 from .advice import ALARM_KIND
 from .state import LineView
 
@@ -22,9 +23,12 @@ if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
     from tui.session.connect.search import Search
     from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
 
 NONE_AT_ADDRESS = "No drive answered at address {} (2 attempts)."
 NONE_AT_ADDRESSES = "No drive answered at addresses {} (2 attempts)."
+UNPROBED = "No stop was sent to addresses {}: the scan ended before it reached them."
+SCAN_AGAIN = "Press s to scan, then F9."
 COMPARE_WITH_BACKUP = "Press Ctrl+D on this drive to compare. Nothing is written."
 WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
 NO_SCAN_IN_REPLAY = "This is a replay: it has the drives of its record."
@@ -66,7 +70,7 @@ class Scanning(LineView):
         `typed` is stored as the addresses of this line. With `once`, silent addresses are not
         retried, and the caller reports the result.
         """
-        from tui.session.connect.other_masters import MasterDetector, OtherMaster
+        from tui.session.connect.other_masters import MasterDetector
         from tui.session.connect.search import Search
 
         fleet = self.app.fleet
@@ -83,6 +87,23 @@ class Scanning(LineView):
         look = MasterDetector(fleet.line).look
         now = fleet.clock.monotonic
         search = fleet.search = Search(devices, patient=patient, once=once, between=look, now=now)
+        try:
+            await self._carry_out(fleet, search, typed, once=once)
+        finally:
+            self._report_unprobed(search)
+
+    def _report_unprobed(self, search: Search) -> None:
+        """Report the addresses that a stop of all during an ended scan has not reached."""
+        from tui.session.connect.addresses import addresses_text
+
+        if search.stops_found and search.unprobed:
+            self.say(UNPROBED.format(addresses_text(search.unprobed)), SCAN_AGAIN, ALARM_KIND)
+
+    async def _carry_out(self, fleet: Fleet, search: Search, typed: str, *, once: bool) -> None:
+        """Carry out a scan to its end, and report its result."""
+        from tui.session.connect.other_masters import OtherMaster
+
+        devices = search.devices
         if not once:
             self.later = 0.0
             self.tell_search()
@@ -176,18 +197,25 @@ class Scanning(LineView):
 
     async def _take(self, result: ScanResult) -> None:
         """Add a drive that answered, with its profile; report a damaged identification."""
+        fleet, search = self.app.fleet, self.search
         if result.error:
             self.unclear |= {result.device}
             text = f"{result.error} A device has this address."
+            if result.identity is None and search is not None and search.is_stopping:
+                text = f"{text} It was sent no stop. Stop it at the machine."
             self.say(text, "Press s to scan again.", ALARM_KIND)
         if result.identity is None:
             return
         if not result.error:
             self.unclear -= {result.device}
             await self._equip(result.identity)
-        elif (fleet := self.app.fleet) is not None and fleet.console(result.device) is None:
+        elif fleet is not None and fleet.console(result.device) is None:
             # assign no profile, not even the typed one; a known drive keeps its stop keys
             fleet.note(result.identity)
+        # looked up now: F9 may have come since
+        is_stopping = search is not None and search.is_stopping
+        if is_stopping and fleet is not None and fleet.console(result.device) is None:
+            tell_unreached(self.app, fleet.strangers)
         self.look()
         self._lead_to_drives()
 

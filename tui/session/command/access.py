@@ -51,7 +51,14 @@ class NotFollowed(OrderRefused):
 
 
 class HalfSent(NotFollowed):
-    """A command of several words ended before its last one."""
+    """A command of several words ended before its last one.
+
+    `needs_stop` is False for a command that moves no motor.
+    """
+
+    def __init__(self, text: str, *, needs_stop: bool) -> None:
+        super().__init__(text)
+        self.needs_stop = needs_stop
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +148,8 @@ class CommandAccess(Writer):
             ended = f"{order.name} ended after word {max(sent, 1)} of {len(order.words)}."
             why = f"The next step failed: {sentence(str(error))}"
             parts = (ended, why, await self._stop_half(order))
-            raise HalfSent(" ".join(filter(None, parts))) from error
+            text, needs_stop = " ".join(filter(None, parts)), order.id not in NOT_STOPPED_AFTER
+            raise HalfSent(text, needs_stop=needs_stop) from error
 
     async def _wait(self, chart: Chart, order: Order, wait: OrderWait) -> None:
         """Wait before the next word of a command. Raises NotFollowed, and the line's errors."""

@@ -96,6 +96,8 @@ class Stopper:
         self._last = LastStop(line, journal, self._say)
         self._own: dict[int, tuple[DriveSession, DriveSession]] = {}
         """By device, a session with a contradicted profile, and one of the drive's own family."""
+        self._quiet: dict[int, float] = {}
+        """By device, the time of a stop that leaves a message only if it fails."""
         self._lock = threading.Lock()
 
     @property
@@ -110,14 +112,18 @@ class Stopper:
         by: str = "the stop key",
         *,
         given: bool = False,
+        quiet: bool = False,
     ) -> None:
         """Stop drives; end their work and their arming. Raises LineClosed.
 
-        `given` is True if all programs on the line already know of the stop. A stop whose word
-        still waits is not restarted; otherwise a key that is held down would send none.
+        `given` is True if all programs on the line already know of the stop. A `quiet` stop leaves
+        a message only if it fails. A stop whose word still waits is not restarted; otherwise a key
+        that is held down would send none.
         """
         wanted = list(sessions)
         ordered = _now(wanted[0]) if wanted else 0.0
+        if quiet:
+            self._quiet |= {session.device: ordered for session in wanted}
         # first, because it cancels earlier commands of other programs
         if not given:
             carried_on(lambda: self._line.facts.give_stop([item.device for item in wanted], by))
@@ -227,8 +233,9 @@ class Stopper:
         report = StopReport(session.device, phase, text, ordered, since)
         self._reports[session.device] = report  # two threads may report, of two drives
         if not same:
-            if self._events is not None:
-                kind = "failed" if phase in NOT_STOPPING else "stop"
+            failed = phase in NOT_STOPPING
+            if self._events is not None and (failed or self._quiet.get(session.device) != ordered):
+                kind = "failed" if failed else "stop"
                 self._events.add(kind, message_text(phase, text), session.device)
             log.info("stop of device %s: %s, %s", session.device, phase, text)
 

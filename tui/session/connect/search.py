@@ -66,6 +66,10 @@ class Search:
         self.answered: frozenset[int] = frozenset()
         self.ended = ""
         """`done`, `stopped`, or empty while it runs."""
+        self.stops_found = False
+        """Set by a stop of all during the search: it stops each drive that it finds. Any thread."""
+        self._probed = 0
+        """Number of addresses that the first round has probed."""
         self.cost = 0.0
         """Seconds that an empty address costs; 0 before the first request."""
         self._cost_again = 0.0
@@ -77,6 +81,16 @@ class Search:
     def goes_on(self) -> bool:
         """True while the search runs."""
         return not self.ended
+
+    @property
+    def is_stopping(self) -> bool:
+        """True while it stops each drive that it finds."""
+        return self.goes_on and self.stops_found
+
+    @property
+    def unprobed(self) -> tuple[int, ...]:
+        """Addresses that were not probed yet: a drive there is not known, and not stopped."""
+        return self.devices[self._probed :]
 
     @property
     def left(self) -> float:
@@ -157,7 +171,7 @@ class Search:
             return False
         if result.identity is None or not (result.identity.reference or result.identity.profile):
             return False
-        self.answered = frozenset(self.devices)
+        self.answered, self._probed = frozenset(self.devices), 1
         await found(result)
         return True
 
@@ -173,8 +187,9 @@ class Search:
         """Probe these addresses; return the silent ones."""
         self.requested, self.of, self._silent = 0, len(devices), _SilentTimes()
         silent: list[int] = []
-        asks = _Considerate(line, self._rests)
+        asks = _Considerate(line, self._rest)
         for number, device in enumerate(devices, start=1):
+            self._probed = max(self._probed, number - 1)
             self._between()
             self.requested, self.at, began = number, device, self._now()
             if paused := line.facts.paused.get(device):
@@ -201,7 +216,13 @@ class Search:
                 result = ScanResult(device, None, str(fault))
             self.answered |= {device}
             await found(result)
+        self._probed = len(self.devices)
         return silent
+
+    async def _rest(self, seconds: float) -> None:
+        """Pause for regular polling, unless motors may run that are still to be found."""
+        if not self.stops_found:
+            await self._rests(seconds)
 
 
 class _SilentTimes(NamedTuple):
