@@ -6,6 +6,8 @@ import itertools
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from textual.pilot import Pilot
@@ -15,10 +17,12 @@ from tui.app import DrivePanelApp
 from tui.bus.errors import LineError
 from tui.screens.dialogs.question import Question
 from tui.screens.faults.screen import FaultsScreen
+from tui.screens.frame_source import FrameSource
 from tui.screens.key_dispatcher import NOBODY_TO_STOP
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
 from tui.session.connect.open_line import demo_line
+from tui.session.events import EventLog
 from tui.session.work import OutcomeKind
 from tui.simulator import Simulation
 from tui.widgets.lines import Lines
@@ -108,6 +112,20 @@ async def test_reply_to_a_key_stays_on_its_screen_and_a_trip_does_not() -> None:
         await made.on("3")
         await made.pilot.pause(0.6)
         assert "Tripped on ObF" in made.shown("said")
+
+
+def test_reply_to_a_key_stays_with_its_drive() -> None:
+    first, second = object(), object()
+    events = EventLog()
+    app: Any = SimpleNamespace(events=events, place="monitor", chosen=first, fleets=[])
+    source = FrameSource(app)
+    about = events.add("done", "Wrote 3 parameters, all verified.", 1)
+    reply = events.add("told", "Not armed. Press a to arm this drive.")
+    assert source._event() is reply
+    app.chosen = second
+    assert source._event() is about
+    app.chosen = first
+    assert source._event() is reply
 
 
 async def test_failed_work_and_a_stop_in_vain_are_shown_on_every_screen() -> None:

@@ -124,6 +124,8 @@ def test_every_key_has_a_meaning_on_its_screen() -> None:
     assert elsewhere("monitor", "r") == ""
     assert elsewhere("monitor", "Y", "Y") == ""
     assert elsewhere("monitor", "P", "P").startswith("P works on Control (6)")
+    assert "Start-up (B)" in elsewhere("monitor", "enter")
+    assert "another screen" not in " ".join(elsewhere("trend", key) for key in ("enter", "tab"))
 
 
 def test_a_capital_letter_names_caps_lock_if_the_small_one_works_here() -> None:

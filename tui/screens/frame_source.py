@@ -92,8 +92,8 @@ class FrameSource:
 
     def __init__(self, app: Panel) -> None:
         self._app = app
-        self._bound: tuple[Event | None, str] = (None, "")
-        """The newest event, and the screen on which it was first shown."""
+        self._bound: tuple[Event | None, str, DriveConsole | None] = (None, "", None)
+        """The newest event, and the screen and the open drive with which it was first shown."""
         self._busy: tuple[float, float] | None = None
         self._load: float | None = None
 
@@ -216,14 +216,14 @@ class FrameSource:
     def _event(self) -> Event | None:
         """Return the newest event that concerns the screen on top; None without one.
 
-        A reply to a key stays on the screen where it was shown first. On others the newest of the
-        events before it is shown. The failure of a task is shown on
-        every screen.
+        A reply to a key stays on the screen, and with the drive, where it was shown first. On
+        others the newest of the events before it is shown. The failure of a task is shown on every
+        screen.
         """
-        newest, place = self._app.events.newest, self._app.place
+        newest, place = self._app.events.newest, (self._app.place, self._app.chosen)
         if newest is not self._bound[0]:
-            self._bound = newest, place
-        if newest is None or not self._is_reply(newest) or place == self._bound[1]:
+            self._bound = newest, *place
+        if newest is None or not self._is_reply(newest) or place == self._bound[1:]:
             return newest
         before = (event for event in reversed(self._app.events.events) if not self._is_reply(event))
         return next(before, None)

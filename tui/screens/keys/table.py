@@ -266,12 +266,17 @@ def elsewhere(screen: str, key: str, character: str | None = None) -> str:
 def _works_on(found: Sequence[Action]) -> str:
     """The screens on which a key works, by its actions."""
     first = found[0]
-    names = {tab.name: f"{tab.title} ({tab.digit})" for tab in TABBED}
+    names = {page.name: _named(page) for page in SCREENS if page.digit or page.key}
     where = [names[a.screens[0]] for a in found if a.screens[0] in names] or ["another screen"]
     if len(set(where)) == 1:
         return f"{first.shown} works on {where[0]}: {first.help}"
     *most, last = sorted(set(where), key=lambda name: name[-2])
     return f"{first.shown} works on {', '.join(most)} and {last}."
+
+
+def _named(page: Registration) -> str:
+    """The title of a screen with the key that shows it."""
+    return f"{page.title} ({page.digit or page.key})"
 
 
 def once_closed(screen: str, key: str, character: str | None = None) -> str:
