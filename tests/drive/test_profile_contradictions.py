@@ -30,8 +30,22 @@ def test_contradiction_is_refused_at_its_line(tmp_path: Path, mistake: dict[str,
     path = tmp_path / "own.toml"
     path.write_text(text, "utf-8")
     line = text[: text.index(mistake["at"])].count("\n") + 1
-    found = library.faults_of(path)
+    found = library.all_faults_of(path)
     assert f"{path}:{line}: {mistake['reported']}" in found, (line, found)
+
+
+def test_profile_whose_link_differs_from_its_factory_choices_can_still_be_used(
+    tmp_path: Path,
+) -> None:
+    [mistake] = [m for m in MISTAKES["mistakes"] if "factory choice is 4800" in m["reported"]]
+    text = FILES[mistake["file"]].read_text("utf-8")
+    for right, wrong in mistake["changes"]:
+        text = text.replace(right, wrong)
+    path = tmp_path / "own.toml"
+    path.write_text(text, "utf-8")
+    assert library.load_file(path).id
+    assert library.faults_of(path) == []
+    assert len(library.all_faults_of(path)) == 1
 
 
 UPPER_BYTE = ("address = 0x2100\nmask = 0xFF", "address = 0x2226\nshift = 8\nmask = 0xFF")

@@ -18,6 +18,7 @@ import pytest
 from tui.drive.errors import ProfileError
 from tui.drive.profile import check, library
 from tui.drive.profile.converting import converted
+from tui.drive.profile.rules import CHECKED_RULES
 from tui.drive.profile.schema import ProfileData
 from tui.drive.profile.shared_rows import ProfileTables
 from tui.drive.profile.toml_lines import TomlPath
@@ -40,9 +41,9 @@ def faults_of(tables: dict[str, Any]) -> list[str]:
     try:
         data = converted(tables, ProfileData)
     except msgspec.ValidationError:
-        faults = check._faults_of_form(sources)
+        faults = check._faults_of_form(sources, CHECKED_RULES)
     else:
-        faults = check._in_order(check._placed(sources, check._broken_rules(data)))
+        faults = check._in_order(check._placed(sources, check._broken_rules(data, CHECKED_RULES)))
     return [f"{fault.file}: {fault.text}" for fault in faults] or [NOTHING]
 
 

@@ -14,7 +14,7 @@ from ..errors import ProfileError
 from .address_rule import fill_addresses
 from .converting import converted
 from .form import form_faults, place_label
-from .rules import RULES
+from .rules import RULES, Finding, Rules
 from .rules.hints import HINT_RULES
 from .schema import ProfileData
 from .shared_rows import ProfileTables, read_tables
@@ -49,7 +49,9 @@ def checked_data(path: Path, packaged: Path) -> ProfileData:
     return data
 
 
-def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[ProfileFault]]:
+def examined(
+    path: Path, packaged: Path, rules: Rules = RULES
+) -> tuple[ProfileData | None, list[ProfileFault]]:
     """Return the data of a profile file, and all its faults by line.
 
     The data is None if the form is wrong. `packaged` is the folder of the profiles that come with
@@ -62,8 +64,8 @@ def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[Profi
     try:
         data: ProfileData = converted(sources.tables, ProfileData)
     except msgspec.ValidationError:
-        return None, _faults_of_form(sources)
-    return data, _in_order(_placed(sources, _broken_rules(data)))
+        return None, _faults_of_form(sources, rules)
+    return data, _in_order(_placed(sources, _broken_rules(data, rules)))
 
 
 def hints_in(path: Path, packaged: Path) -> list[ProfileFault]:
@@ -75,7 +77,7 @@ def hints_in(path: Path, packaged: Path) -> list[ProfileFault]:
     return _in_order(_placed(sources, found))
 
 
-def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
+def _faults_of_form(sources: ProfileTables, rules: Rules) -> list[ProfileFault]:
     """Return the faults of form, and the other faults that can still be found."""
     form, mended = form_faults(sources.tables)
     reported = [
@@ -87,7 +89,8 @@ def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
     except msgspec.ValidationError as error:
         reported = reported or [((), f"the file: {error}.")]
     else:
-        reported += [rule for rule in _broken_rules(data) if not _invented(rule[0], form.invented)]
+        broken = _broken_rules(data, rules)
+        reported += [rule for rule in broken if not _invented(rule[0], form.invented)]
     return _in_order(_placed(sources, reported))
 
 
@@ -96,8 +99,8 @@ def _invented(path: TomlPath, invented: list[TomlPath]) -> bool:
     return any(path[: len(pair)] == pair or pair[: len(path)] == path for pair in invented)
 
 
-def _broken_rules(data: ProfileData) -> list[tuple[TomlPath, str]]:
-    return [finding for rule in RULES for finding in rule(data)]
+def _broken_rules(data: ProfileData, rules: Rules) -> list[Finding]:
+    return [finding for rule in rules for finding in rule(data)]
 
 
 def _placed(sources: ProfileTables, found: list[tuple[TomlPath, str]]) -> Iterator[ProfileFault]:

@@ -201,10 +201,11 @@ def all_faults_of(path: Path) -> list[str]:
     """Return all faults of a profile file and of its files of help and search, if it has them."""
     from .check import examined
     from .help_file import read_help
+    from .rules import CHECKED_RULES
     from .search_file import read_vocabulary
 
     try:
-        data, faults = examined(path, packaged_folder())
+        data, faults = examined(path, packaged_folder(), CHECKED_RULES)
     except ProfileError as error:
         return [str(error)]
     reported = [str(fault) for fault in faults]
@@ -241,10 +242,16 @@ def matching_profiles(reference: str) -> list[str]:
     return [profile_id for _, profile_id in _fits(reference)]
 
 
+def best_profiles(reference: str) -> list[str]:
+    """Return the ids of the profiles that fit a reported reference best; several fit equally."""
+    fits = _fits(reference)
+    return sorted(profile_id for longest, profile_id in fits if longest == fits[0][0])
+
+
 def identified_profile(reference: str) -> str | None:
     """Return the profile that fits a reported reference best; None if several fit equally."""
-    (best, found), (second, _), *_ = *_fits(reference), (0, None), (0, None)
-    return found if best > second else None
+    found = best_profiles(reference)
+    return found[0] if len(found) == 1 else None
 
 
 def _fits(reference: str) -> list[tuple[int, str]]:

@@ -22,7 +22,9 @@ from . import (
 Finding = tuple[TomlPath, str]
 """Place of an error, and the error."""
 
-RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
+Rules = tuple[Callable[[ProfileData], Iterator[Finding]], ...]
+
+RULES: Rules = (
     *parameters.PARAMETER_RULES,
     *registers.REGISTER_RULES,
     *names.NAME_RULES,
@@ -35,4 +37,7 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     *identification.IDENTIFICATION_RULES,
 )
 
-__all__ = ["RULES", "Finding"]
+CHECKED_RULES = (*RULES, consistency.factory_choices)
+"""Rules of `profiles --check`: a profile that breaks only the further ones can still be used."""
+
+__all__ = ["CHECKED_RULES", "RULES", "Finding", "Rules"]

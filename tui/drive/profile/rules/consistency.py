@@ -212,6 +212,11 @@ def factory_line(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     for place, baud in enumerate(link.bauds):
         if baud in link.bauds[:place]:
             yield ("link", "bauds", place), f"baud {baud} occurs twice."
+
+
+def factory_choices(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield factory choices of the line's settings that [link] contradicts."""
+    link = data.link
     for index, setting in enumerate(link.settings):
         chosen = [choice for choice in setting.choices if choice.raw == setting.factory]
         at: TomlPath = ("link", "settings", index)
