@@ -185,3 +185,10 @@ def test_write_is_listed_in_the_journal() -> None:
 )
 def test_since_accepts_durations_times_and_dates(text: str, wanted: datetime | None) -> None:
     assert parse_since(text, NOW) == wanted
+
+
+def test_writes_to_simulated_drives_are_listed_by_their_line() -> None:
+    run(0, "write", "sim:atv312", "ACC=5", "--arm")
+    [written] = json.loads(run(0, "journal", "--json"))["entries"]
+    assert (written["line"], written["code"]) == ("sim:atv312@1", "ACC")
+    assert "ACC" in run(0, "journal", "--drive", "1/sim:atv312")

@@ -68,6 +68,8 @@ class SharedState:
 
     def __init__(self, me: Program | None = None) -> None:
         self.me = me or Program("here", "drivepanel", os.getpid())
+        self.simulated_as = ""
+        """LINE of simulated drives, whose link is a temporary one; empty for other lines."""
         self.programs: tuple[Program, ...] = (self.me,)
         """All on the line, the owner first."""
         self.commanders: Mapping[int, str] = MappingProxyType({})

@@ -214,7 +214,7 @@ class DriveSession:
     @property
     def line_text(self) -> str:
         """The line as a person types it."""
-        return label(self.line.link)
+        return self.line.facts.simulated_as or label(self.line.link)
 
     def state(self, longest: float) -> ChartState:
         """Return the drive's state; unknown if its status is older than `longest` seconds.

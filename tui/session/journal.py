@@ -23,6 +23,7 @@ from typing import Literal
 from tui.drive.plain import escaped_json
 from tui.drive.sentences import counted
 
+from .connect.line_key import SIMULATED_PREFIX
 from .eeprom_counts import EepromCounts, EepromWrite
 from .journal_file import JournalFile
 from .paths import state_folder
@@ -311,8 +312,12 @@ class Journal:
         return ""
 
     def _count(self, entry: Entry) -> None:
-        """Count a write to an EEPROM, together with those that follow; never raise."""
-        if entry.eeprom and entry.kind == "write":
+        """Count a write to an EEPROM, together with those that follow; never raise.
+
+        A simulated drive is a new one each time: its writes are not counted.
+        """
+        simulated = entry.line.startswith(SIMULATED_PREFIX)
+        if entry.eeprom and entry.kind == "write" and not simulated:
             code = entry.code if entry.eeprom == "write" else ""
             place = (entry.line, entry.device, entry.profile, entry.drive, code)
             self._uncounted.append(EepromWrite(*place, time.time()))

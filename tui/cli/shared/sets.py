@@ -7,7 +7,6 @@ import re
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -136,8 +135,6 @@ def set_of_drive(
     async def work(opened: OpenLine) -> tuple[DriveSession, ParameterSet]:
         session = await connect_drive(opened, target)
         values = await take_set(session, settings_only=settings_only)
-        if opened.simulation is not None:  # its port is a temporary one
-            values = replace(values, head=replace(values.head, line=opened.text))
         return session, values
 
     return on_line(target, work, read_only=True)

@@ -230,10 +230,13 @@ def _simulated(
     timing = Timing(min_timeout=1.0)
     line = Line(_serve(simulation), timing=timing, read_only=read_only, gated=True)
     text = SIMULATED_PREFIX + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
+    line.facts.simulated_as = text
     profiles = {spec.address: spec.profile for spec in specs}
 
     def again(other: SerialLink) -> ModbusLine:
-        return Line(other, timing=timing, read_only=read_only, gated=True)
+        made = Line(other, timing=timing, read_only=read_only, gated=True)
+        made.facts.simulated_as = text
+        return made
 
     opened = OpenLine(text, line, simulation, tuple(profiles), profiles, again=again)
     return _opened(opened, wait)
