@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -109,3 +110,12 @@ def test_simulated_drive_that_does_not_identify_itself_has_the_profile_of_its_li
     assert json.loads(run(0, "status", f"sim:{family}", "--json"))["profile"] == family
     stopped = json.loads(run(0, "stop", f"sim:{family}", "--json"))
     assert (stopped["profile"], stopped["stopped"]) == (family, True)
+
+
+@pytest.mark.sweep
+def test_confirm_names_no_option_that_was_not_given(atv71: str, tmp_path: Path) -> None:
+    file = tmp_path / "evidence.json"
+    done = ended(1, "profiles", "confirm", "atv312", atv71, "--to", file)
+    assert "says it is ATV71HU15M3" in done.stderr
+    assert "is compared with this profile anyway" in done.stderr
+    assert "--force-profile" not in done.stderr

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import sys
@@ -13,7 +14,13 @@ import pytest
 
 from tests.sources import ROOT
 from tui.cli.plant.broker import broker_of
-from tui.cli.shared.standard_streams import ForgivingFile, keep_streams, output_lost
+from tui.cli.shared.errors import OUTPUT_LOST, USAGE, Failure, file_failures
+from tui.cli.shared.standard_streams import (
+    STANDARD,
+    ForgivingFile,
+    keep_streams,
+    output_lost,
+)
 from tui.drive.small_file import supplied
 
 from .commands import invoked, refused
@@ -115,3 +122,16 @@ def test_frames_are_alone_on_standard_output(capfdbinary: pytest.CaptureFixture[
     data = capfdbinary.readouterr().out
     assert data.startswith(b"\x0a\x0d\x0d\x0a")
     assert b"Listening" not in data
+
+
+def test_full_disk_behind_standard_output_exits_with_74() -> None:
+    full = OSError(errno.ENOSPC, "No space left on device")
+    text = "standard output cannot be written: No space"
+    with pytest.raises(Failure, match=text) as lost, file_failures(STANDARD):
+        raise full
+    assert lost.value.exit_code == OUTPUT_LOST
+    with pytest.raises(Failure, match=r"x\.csv cannot be") as other, file_failures(Path("x.csv")):
+        raise full
+    assert other.value.exit_code == USAGE
+    with pytest.raises(BrokenPipeError), file_failures(STANDARD):
+        raise BrokenPipeError

@@ -6,6 +6,7 @@ import asyncio
 import struct
 import time
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -21,11 +22,12 @@ from tui.drive.profile.profile import Profile
 from tui.drive.settings.memory_orders import MemoryRefused, eeprom_copy, save_effect
 from tui.session.drive import UnsavedSettings
 from tui.session.eeprom_counts import EepromWrite
+from tui.session.journal import Journal
 from tui.session.read.reader import Reader
 from tui.session.settings.eeprom import save_to_eeprom
 from tui.session.settings.wear import ASK_FROM
 from tui.session.settings.write import NotTaken
-from tui.simulator import DriveSpec, SimulatedDrive
+from tui.simulator import DriveSpec, SimulatedDrive, Simulation
 from tui.simulator.proving.drive_steps import drive_steps
 
 RULE = 'summary = "An invented drive for tests of references."\n'
@@ -140,6 +142,25 @@ async def test_save_writes_unsaved_settings_to_eeprom_and_counts_only_these_writ
             await save_to_eeprom(session, made.journal, made.permit())
         made.drive.power_cycle()
         assert (made.drive.raw("ACC"), made.drive.raw("DEC")) == (50, 70)
+
+
+def test_restore_with_a_frequent_save_is_refused_before_anything_is_written(
+    tmp_path: Path,
+) -> None:
+    installed()
+    with Simulation([DriveSpec(MIXER, 1)]) as simulation:
+        line = "tcp:{}:{}".format(*simulation.serve_tcp())
+        words = (str(tmp_path / "set.toml"), "-p", MIXER)
+        CliRunner().invoke(main, ["backup", line, *words])
+        simulation.drive(1).set("ACC", 50)
+        counts, now = Journal().eeprom, time.time()
+        counts.add(
+            [EepromWrite(line, 1, MIXER, "", "ACC", now - n) for n in reversed(range(ASK_FROM))]
+        )
+        done = CliRunner().invoke(main, ["restore", line, *words, "--arm", "--save"])
+        assert done.exit_code == 5, done.output
+        assert "ACC would go to EEPROM again" in done.output
+        assert simulation.drive(1).raw("ACC") == 50, "not in RAM either"
 
 
 async def test_save_is_refused_while_the_motor_runs_and_without_arming() -> None:

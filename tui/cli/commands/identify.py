@@ -165,4 +165,4 @@ def _model_row(identity: DriveIdentity, words: Mapping[str, int]) -> list[tuple[
 
 def _choices(found: DriveIdentity) -> str:
     fits = ", ".join(found.candidates)
-    return f"not known; it may be {fits}" if fits else "not known; name one with -p"
+    return f"not known; it may be {fits}: choose with -p" if fits else "not known; name one with -p"

@@ -320,7 +320,11 @@ async def _restore(
     try:
         gate = wear_gate(journal, options.confirmed, messages)
         if save:
-            await refuse_frequent_save(session, gate)
+            planned: list[str] = []
+            if any(p.eeprom_address is not None for p in session.profile.parameters):
+                plan = await plan_for(session, values, source, options, counter())
+                planned = [edit.code for edit in plan.edits]
+            await refuse_frequent_save(session, gate, planned)
         done = await bring_back(
             session, journal, values, source, options, permit=permit,
             progress=telling, reading=counter(), gate=gate,

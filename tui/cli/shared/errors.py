@@ -16,6 +16,7 @@ import click
 from tui.drive.sentences import first_of
 
 from .say import say
+from .standard_streams import STANDARD
 
 if TYPE_CHECKING:
     from tui.session.journal import Journal
@@ -55,14 +56,25 @@ class Failure(click.ClickException):
 
 @contextmanager
 def file_failures(path: Path) -> Iterator[None]:
-    """Raise errors of writing this file as Failure with status 2."""
+    """Raise errors of writing this file as Failure: status 2, for standard output 74.
+
+    BrokenPipeError passes if the reader of standard output has exited.
+    """
     try:
         yield
     except FileExistsError as error:
         text = f"{path} already exists. Choose another name or use --force."
         raise Failure(text, USAGE) from error
     except OSError as error:
-        raise Failure(f"{path} cannot be written: {error.strerror or error}.", USAGE) from error
+        why = error.strerror or str(error)
+        if path != STANDARD:
+            raise Failure(f"{path} cannot be written: {why}.", USAGE) from error
+        if isinstance(error, BrokenPipeError):
+            raise
+        raise Failure(_LOST.format(why=why), OUTPUT_LOST) from error
+
+
+_LOST = "What was printed is lost: standard output cannot be written: {why}."
 
 
 @contextmanager
@@ -137,7 +149,7 @@ def _tell_lost_output(*, acts: bool) -> None:
     from .standard_streams import output_lost
 
     if lost := output_lost():
-        text = f"What was printed is lost: standard output cannot be written: {lost}."
+        text = _LOST.format(why=lost)
         if not acts:
             raise Failure(text, OUTPUT_LOST)
         say(f"drivepanel: {text}", err=True)

@@ -350,11 +350,13 @@ def _believe_the_person(session: DriveSession, target: Target) -> None:
         way = _way_to_profile(session.known_identity.profile, target)
         raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
     session.bar_unconfirmed()
-    say(
-        f"drivepanel: {session.contradiction} {FORCE_PROFILE} uses this profile anyway:"
-        " values, units and names may be wrong.",
-        err=True,
-    )
+    context = click.get_current_context(silent=True)
+    is_asked = context is not None and context.params.get("force_profile")
+    how = _FORCED if is_asked else "The drive is compared with this profile anyway."
+    say(f"drivepanel: {session.contradiction} {how}", err=True)
+
+
+_FORCED = f"{FORCE_PROFILE} uses this profile anyway: values, units and names may be wrong."
 
 
 def _recall(session: DriveSession) -> None:
@@ -379,6 +381,10 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
 
 
 _FITS_NONE = "Device {device} answers as {reference!r}; name its profile with -p: {profiles}."
+_FITS_SEVERAL = (
+    "Device {device} answers as {reference!r}, which fits the profiles {profiles} equally. Choose"
+    " one with -p, or give one of them a longer prefix in reference_prefixes."
+)
 _NOT_IDENTIFIED = (
     "Device {device} answers but does not identify itself; name its profile with -p: {profiles}."
 )
@@ -390,6 +396,8 @@ def unidentified(identity: DriveIdentity) -> click.UsageError:
 
     text = _FITS_NONE if identity.reference else _NOT_IDENTIFIED
     fits = identity.candidates or tuple(listing.id for listing in library.listings())
+    if len(equal := library.best_profiles(identity.reference)) > 1:
+        text, fits = _FITS_SEVERAL, tuple(equal)
     return click.UsageError(
         text.format(device=identity.device, reference=identity.reference, profiles=", ".join(fits))
     )
