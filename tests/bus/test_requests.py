@@ -129,7 +129,7 @@ def test_reply_is_decoded() -> None:
 
 def test_text_of_function_17_is_found_among_vendor_bytes() -> None:
     assert own_words_of(b"\x11\x0f\x02ATV71HU15M3\xff\0AB") == b"ATV71HU15M3"
-    assert own_words_of(b"\x11\x02\x05\xff") == b""
+    assert own_words_of(b"\x11\x02\x05\xff") == b"16#05FF"
 
 
 REFUSED: list[tuple[Request, str]] = [

@@ -11,8 +11,9 @@ from tests.mixer import MIXER, installed_mixer, mixer_text
 from tui.bus.api import Priority
 from tui.bus.errors import ChecksumFault
 from tui.bus.fake import FakeLine
-from tui.bus.requests import Read, ReportId
+from tui.bus.requests import Read, ReportId, own_words_of
 from tui.cli.main import main
+from tui.cli.shared.options import unidentified
 from tui.drive.finding import PresenceProbe
 from tui.drive.profile import library
 from tui.drive.profile.new_file import new_profile_text
@@ -147,6 +148,31 @@ async def test_function_17_identifies_for_commands_too() -> None:
     assert (await identify_drive(line, 1)).profile is None
 
 
+BY_BYTES = BY_TEXT.replace("MIXER-72", "16#2A00FF01").replace("MIXER-7", "16#2A00")
+
+
+async def test_bytes_of_function_17_identify_a_drive_without_a_text() -> None:
+    installed(BY_BYTES, FUNCTION_17)
+    line = FakeLine({1: WORDS})
+    line.devices[1].called = own_words_of(b"\x11\x04\x2a\x00\xff\x01")
+    identity = await identify_drive(line, 1)
+    assert (identity.profile, identity.reference) == (MIXER, "16#2A00FF01")
+    scanned = (await found(line)).identity
+    assert scanned is not None
+    assert scanned.profile == MIXER
+    line.devices[1].called = own_words_of(b"\x11\x02\x2b\x00")
+    assert (await identify_drive(line, 1)).reference == "", "bytes of no profile are no name"
+    assert own_words_of(b"\x11\x00") == b""
+
+
+def test_simulated_drive_replies_the_bytes_of_function_17() -> None:
+    profile = installed(BY_BYTES, FUNCTION_17)
+    drive = SimulatedDrive(profile, DriveSpec(MIXER, 1))
+    assert drive.line_side.answer(1, b"\x11") == b"\x11\x04\x2a\x00\xff\x01"
+    [step] = [step for step in prove_profile(profile) if "function 17" in step.title]
+    assert step.fault == ""
+
+
 async def test_function_17_is_not_requested_if_no_profile_has_it() -> None:
     installed()
     line = FakeLine({1: WORDS})
@@ -236,6 +262,8 @@ def checked(*changes: tuple[str, str], name: str = "mixer.toml") -> Result:
             "it needs values, or for a text",
         ),
         ('reference_prefixes = ["MI"]', "too short"),
+        ('reference_prefixes = ["16#2A"]', "needs at least two bytes"),
+        ('reference_prefixes = ["16#2AF"]', "needs at least two bytes"),
         ('reference_prefixes = ["ATV312"]', "the profile atv312 has the prefix 'ATV312' too"),
     ],
 )
@@ -281,6 +309,9 @@ async def test_reference_that_two_profiles_claim_identifies_no_drive(packaged: N
     line.devices[1].identity = {1: b"ATV312HU09M3"}
     identity = await identify_drive(line, 1)
     assert (identity.profile, set(identity.candidates)) == (None, {"atv312", MIXER})
+    text = str(unidentified(identity))
+    assert "'ATV312HU09M3', which fits the profiles atv312, example-mixer equally" in text
+    assert "Choose one with -p" in text
 
 
 def test_copy_of_a_profile_identifies_no_drive() -> None:

@@ -301,8 +301,12 @@ _WORDS = re.compile(rb"[ -~]{3,}")
 
 
 def own_words_of(pdu: bytes) -> bytes:
-    """The longest text in a checked reply of function 17; the bytes around it are its maker's."""
-    return max(_WORDS.findall(pdu[2:]), key=len, default=b"").strip()
+    """The longest text in a checked reply of function 17; the bytes around it are its maker's.
+
+    Without a text, all bytes in hexadecimal, as 16#2AFF.
+    """
+    text = max(_WORDS.findall(pdu[2:]), key=len, default=b"").strip()
+    return text or (b"16#" + pdu[2:].hex().upper().encode() if len(pdu) > 2 else b"")
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,6 +26,8 @@ from .identifying import TRIES, Askable, NotIdentified, ask_identification, inta
 from .register_reads import RegisterReads, families_by_registers
 
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
+HEXADECIMAL = "16#"
+"""Begins the bytes of a reply to function 17 that has no text."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,8 +89,8 @@ async def identify_drive(
     if not identity.reference and await asyncio.to_thread(_any_reports_its_id):
         with suppress(DeviceException, RequestRefused, NoAnswer):
             answer = await line.identify(device, priority=priority, function=REPORT_ID)
-            if answer.objects.get(REFERENCE):
-                identity = await confirmed_identity(device, answer)
+            if _identifies(reported := await confirmed_identity(device, answer)):
+                identity = reported
     return await _by_registers(line, identity, priority, None)
 
 
@@ -143,6 +145,12 @@ async def confirmed_identity(device: int, answer: IdentificationObjects) -> Driv
     return await asyncio.to_thread(identity_from, device, answer)
 
 
+def _identifies(reported: DriveIdentity) -> bool:
+    """Return True if function 17 gave a text, or bytes that a profile names."""
+    text = reported.reference
+    return bool(text) and (bool(reported.candidates) or not text.startswith(HEXADECIMAL))
+
+
 BY_IDENTIFICATION = {IDENTIFY: "function 43", REPORT_ID: "function 17"}
 
 
@@ -182,8 +190,10 @@ async def _identified(
                 line, device, control, priority=priority, within=likely, function=function,
                 tries=TRIES if function == IDENTIFY else 1, healthy=bool(there.families),
             )  # fmt: skip
-        if answer is not None and (answer.objects.get(REFERENCE) or function == IDENTIFY):
-            identity, by = await confirmed_identity(device, answer), how
+        if answer is None:
+            continue
+        identity, by = await confirmed_identity(device, answer), how
+        if function == IDENTIFY or _identifies(identity):
             break
     else:
         # a drive without these functions is not absent: its last answer counts

@@ -271,8 +271,8 @@ def _identifies(profile: Profile, row: IdentityRegister) -> None:
 def _reports_its_id(profile: Profile) -> None:
     reply = ProofBench(profile, None).ask(bytes([REPORT_ID]))
     text = reply[REPORT_TEXT:].decode("ascii", "replace").upper()
-    prefixes = profile.data.identification.reference_prefixes
-    if not any(text.startswith(prefix.upper()) for prefix in prefixes):
+    prefixes = tuple(p.upper() for p in profile.data.identification.reference_prefixes)
+    if not any(found.startswith(prefixes) for found in (text, f"16#{reply[2:].hex().upper()}")):
         raise Unproved(f"it reports {text!r}")
 
 

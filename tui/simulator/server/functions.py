@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -175,9 +176,16 @@ def _identify(server: Server, function: Function, body: bytes) -> bytes:
 
 
 def _report_id(server: Server, function: Function, body: bytes) -> bytes:
-    """Execute function 17: an id, the sign that it runs, and the reference as text."""
+    """Execute function 17: an id, the sign that it runs, and the reference as text.
+
+    A reference such as 16#2AFF is all bytes of the reply.
+    """
     if body or not (text := server.identity.get(REFERENCE_OBJECT, b"")):
         raise _wrong_shape(server)
+    if text.startswith(b"16#"):
+        with suppress(ValueError):
+            data = bytes.fromhex(text[3:].decode())
+            return bytes([len(data)]) + data
     return bytes([2 + len(text), SERVER_ID, RUNS]) + text
 
 

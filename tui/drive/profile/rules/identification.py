@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 
 from tui.drive.values import type_range
@@ -10,6 +11,7 @@ from ..schema import IdentityRegister, Parameter, ProfileData
 from ..toml_lines import TomlPath
 
 REFERENCE, REPORT_ID, IDENTIFY = 1, 17, 43
+_BYTES = re.compile(r"16#([0-9A-Fa-f]{2}){2,}")
 COMMON_BELOW = 256
 """Values below it are common: one alone identifies no family."""
 SHORTEST_TEXT = 3
@@ -60,6 +62,11 @@ def identity_texts(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     own = data.identification
     prefixes = own.reference_prefixes
     for place, prefix in enumerate(prefixes):
+        if prefix.startswith("16#") and not _BYTES.fullmatch(prefix):
+            yield (
+                ("identification", "reference_prefixes", place),
+                f"identification: the prefix {prefix!r} needs at least two bytes, such as 16#2AFF.",
+            )
         if len(prefix.strip()) < SHORTEST_TEXT:
             yield (
                 ("identification", "reference_prefixes", place),
