@@ -13,7 +13,7 @@ from tui.bus.errors import ChecksumFault
 from tui.bus.fake import FakeLine
 from tui.bus.requests import Read, ReportId, own_words_of
 from tui.cli.main import main
-from tui.cli.shared.options import unidentified
+from tui.cli.shared.profile_choice import unidentified
 from tui.drive.finding import PresenceProbe
 from tui.drive.profile import library
 from tui.drive.profile.new_file import new_profile_text

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from ..shared.drive_commands import complain
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
-from ..shared.options import unidentified
+from ..shared.profile_choice import unidentified
 
 if TYPE_CHECKING:
     from tui.bus.api import Priority

@@ -10,18 +10,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
-from .asking import may_ask, says_yes
 from .completion import complete_profile
 from .line_argument import LineArgument, mind_the_drive, mind_the_line, takes_line_as
 from .looking_after import guard_motors, say_shared, to_its_end
 from .numbers import SHORTEST_CYCLE, FiniteRange, seconds
+from .profile_choice import (
+    FORCE_PROFILE,
+    believe_the_person,
+    confirm_unproved,
+    unidentified,
+)
 from .say import say
 from .signals import never_suspended
 from .silence import about_silence, wait_for_state
 
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
-    from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
@@ -137,7 +141,6 @@ class Target(NamedTuple):
         return [self._replace(device=device, others=()) for device in devices]
 
 
-FORCE_PROFILE = "--force-profile"
 force_profile_option = click.option(
     FORCE_PROFILE,
     "force_profile",
@@ -287,34 +290,14 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
         profile = library.load(known)
     session = DriveSession(opened.line, target.device, profile, reported)
     if session.contradiction:
-        _believe_the_person(session, target)
-    await _confirm_unproved(session)
+        believe_the_person(session, target)
+    await confirm_unproved(session)
     mind_the_drive(opened, target.device, reported, "" if session.contradiction else profile.id)
     await _check_byte_order(session)
     await look_after(opened, session, target.line_text).learn()
     await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session
-
-
-async def _confirm_unproved(session: DriveSession) -> None:
-    """Ask a person at the terminal before a command with --arm uses an unproved profile.
-
-    Without one, arming is refused with the way out.
-    """
-    from tui.drive.profile.profile import proof_text
-
-    context = click.get_current_context(silent=True)
-    if not session.is_unconfirmed or context is None or not context.params.get("arm"):
-        return
-    if may_ask() and await says_yes(f"{session.arming.barred} Write to device {session.device}?"):
-        session.confirm_profile()
-        return
-    session.arming.barred = (
-        f"Not armed: the profile {session.profile.id} is unproved ({proof_text(session.profile)}),"
-        " and no person at a terminal. For a script, make a profile of your own and prove it:"
-        f" drivepanel profiles new NAME --from {session.profile.id}"
-    )
 
 
 async def _check_byte_order(session: DriveSession) -> None:
@@ -327,36 +310,6 @@ async def _check_byte_order(session: DriveSession) -> None:
     if session.line.device_state(session.device).heard is not None:
         with suppress(LineError):
             await check_byte_order(Reader(session), Priority.OPERATOR_READ)
-
-
-def _way_to_profile(reported: str | None, target: Target) -> str:
-    """Return how to correct a profile that the drive contradicts, where it was named."""
-    if target.by_recipe:
-        return "Check the address, or correct the profile in the recipe of this drive."
-    if not reported:
-        return "Name the profile of that drive."
-    context = click.get_current_context(silent=True)
-    source = None if context is None else context.get_parameter_source("profile_id")
-    if source is click.core.ParameterSource.DEFAULT_MAP:  # the name of the line has it
-        return f"Name -p {reported}, or correct the settings file."
-    return f"Name -p {reported}, or leave -p away."
-
-
-def _believe_the_person(session: DriveSession, target: Target) -> None:
-    """Use a profile that the drive contradicts if --force-profile is given; else raise."""
-    from tui.session.connect.contradiction import Contradiction
-
-    if not target.force_profile:
-        way = _way_to_profile(session.known_identity.profile, target)
-        raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
-    session.bar_unconfirmed()
-    context = click.get_current_context(silent=True)
-    is_asked = context is not None and context.params.get("force_profile")
-    how = _FORCED if is_asked else "The drive is compared with this profile anyway."
-    say(f"drivepanel: {session.contradiction} {how}", err=True)
-
-
-_FORCED = f"{FORCE_PROFILE} uses this profile anyway: values, units and names may be wrong."
 
 
 def _recall(session: DriveSession) -> None:
@@ -378,26 +331,3 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
     from tui.session.shown import Rating
 
     session.ratings[current.code] = Rating(Decimal(str(rated_current)), "A")
-
-
-_FITS_NONE = "Device {device} answers as {reference!r}; name its profile with -p: {profiles}."
-_FITS_SEVERAL = (
-    "Device {device} answers as {reference!r}, which fits the profiles {profiles} equally. Choose"
-    " one with -p, or give one of them a longer prefix in reference_prefixes."
-)
-_NOT_IDENTIFIED = (
-    "Device {device} answers but does not identify itself; name its profile with -p: {profiles}."
-)
-
-
-def unidentified(identity: DriveIdentity) -> click.UsageError:
-    """The error for a drive that no profile was named for and none fits."""
-    from tui.drive.profile import library
-
-    text = _FITS_NONE if identity.reference else _NOT_IDENTIFIED
-    fits = identity.candidates or tuple(listing.id for listing in library.listings())
-    if len(equal := library.best_profiles(identity.reference)) > 1:
-        text, fits = _FITS_SEVERAL, tuple(equal)
-    return click.UsageError(
-        text.format(device=identity.device, reference=identity.reference, profiles=", ".join(fits))
-    )
