@@ -26,6 +26,7 @@ from tui.bus.gateway.pdu import (
 from tui.bus.gateway.room import ServedConnection, makes_room
 from tui.bus.gateway.server import HEADER, Awake, TcpGateway, TcpRequest
 from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
+from tui.wire.frames import wire_place
 
 
 def test_requests_of_each_function_are_parsed() -> None:
@@ -39,14 +40,25 @@ def test_requests_of_each_function_are_parsed() -> None:
     both = parse_request(bytes.fromhex("17 0C81 0001 2135 0001 02 0007"))
     assert both == WriteRequested(23, 8501, (7,), 3201, 1)
     assert parse_request(bytes.fromhex("2B 0E 01 00")) == IdentifyRequested(1, 0)
+    assert parse_request(bytes.fromhex("02 0003 0009")) == ReadRequested(2, 3, 9)
+    coil = wire_place(1, 3)
+    assert parse_request(bytes.fromhex("05 0003 FF00")) == WriteRequested(5, coil, (1,))
+    coils = parse_request(bytes.fromhex("0F 0003 0009 02 03 01"))
+    assert isinstance(coils, WriteRequested)
+    assert coils == WriteRequested(15, coil, (1, 1, 0, 0, 0, 0, 0, 0, 1))
+    assert 3 not in coils.words, "register 3 is another"
 
 
 @pytest.mark.parametrize(
     ("pdu", "code"),
     [
-        ("01 0000 0001", 1),
-        ("05 0000 FF00", 1),
-        ("0F 0000 0001 01 01", 1),
+        ("01 0000 007E", 3),
+        ("02 FFFF 0002", 2),
+        ("05 0000 0001", 3),
+        ("05 0000 FF00 00", 3),
+        ("0F 0000 0009 01 01", 3),
+        ("0F 0000 0000 00", 3),
+        ("0F FFFF 0002 01 01", 2),
         ("16 0000 00F2 0025", 1),
         ("2B 0D 01 00", 1),
         ("03 0000 007E", 3),
@@ -77,6 +89,11 @@ def test_replies_are_encoded_as_bytes() -> None:
     assert words_pdu(3, [0x0237, 0]) == bytes.fromhex("03 04 0237 0000")
     assert written_pdu(WriteRequested(6, 8501, (7,))) == bytes.fromhex("06 2135 0007")
     assert written_pdu(WriteRequested(16, 8501, (7, 8))) == bytes.fromhex("10 2135 0002")
+    assert words_pdu(2, [1, 0, 0, 0, 0, 0, 0, 0, 1]) == bytes.fromhex("02 02 01 01")
+    assert written_pdu(WriteRequested(5, wire_place(1, 3), (1,))) == bytes.fromhex("05 0003 FF00")
+    assert written_pdu(WriteRequested(15, wire_place(1, 3), (1, 0))) == bytes.fromhex(
+        "0F 0003 0002"
+    )
     assert exception_pdu(16, 11) == bytes.fromhex("90 0B")
 
 

@@ -130,6 +130,7 @@ def test_probe_is_unlike_the_last_requests_to_its_drive_or_gateway(gateway: bool
     for read in reads:
         probes.note_good(read)
     probes.note_good(newer := replace(OWN, address=200))
-    assert probes._good == {1: {2: newer, 3: reads[1]}, 2: {2: reads[2]}}
+    two, three = (read.expectation() for read in reads[:2])
+    assert probes._good == {1: {two: newer, three: reads[1]}, 2: {two: reads[2]}}
     probes.forget_sent()
     assert not probes.sent(1)

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from tui.bus.coils import read_request, write_request
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.expectation import exception_code
 from tui.bus.limits import CAUTIOUS, Limits, Window, send_refusal
@@ -20,9 +21,7 @@ from tui.bus.requests import (
     WriteMany,
     WriteOne,
     own_words_of,
-    read_request,
     words_of,
-    write_request,
 )
 from tui.wire.frames import frame
 

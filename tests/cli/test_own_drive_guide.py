@@ -62,7 +62,7 @@ async def test_guide_leads_from_the_table_to_a_motor_that_runs(tmp_path: Path) -
         ("code,name,max\nA,Ramp,1e999999\n", "max '1e999999' is not a number"),
         ("code,name,max\nA,Ramp,inf\n", "max 'inf' is not a number"),
         (f"code,name\nA,{'x' * 200_000}\n", "t.csv:2: it is not a table"),
-        ("code,name,function\nA,Ramp,5\n", "function '5' is not 3 or 4"),
+        ("code,name,function\nA,Ramp,5\n", "function '5' is not 1, 2, 3 or 4"),
         ("code,name,mask\nA,Ramp,all\n", "mask 'all' is not a number"),
     ],
 )

@@ -475,8 +475,10 @@ async def test_identification_passes_and_unknown_functions_are_refused(bench: Ma
     answer = await made.ask(bytes.fromhex("2B0E0100"))
     assert answer[:2] == b"\x2b\x0e"
     assert b"ATV71" in answer
-    for function in (1, 2, 5, 15, 22, 17):
-        assert await made.ask(bytes([function, 0, 0, 0, 1])) == bytes([function | 0x80, 1])
+    for pdu in ("0100000001", "0200000001", "050000FF00", "0F000000010101", "1600000001"):
+        request = bytes.fromhex(pdu)
+        assert await made.ask(request) == bytes([request[0] | 0x80, 1])
+    assert await made.ask(bytes([17, 0, 0, 0, 1])) == bytes([17 | 0x80, 1])
     assert made.written() == []
 
 

@@ -644,6 +644,7 @@ class Way:
 
     def __init__(self, address: int, *words: int, broadcast: bool = True) -> None:
         self.address, self.words, self.broadcast = address, words, broadcast
+        self.place, self.is_bits = address, False
 
 
 async def test_broadcast_follows_the_wave_with_each_word_once(

@@ -134,7 +134,7 @@ class ModbusLine(Protocol):
         max_age: float = 0.0,
         within: float | None = None,
     ) -> Reply:
-        """Read `count` registers by function 3, or input registers by 4.
+        """Read `count` registers by function 3, input registers by 4, coils by 1, inputs by 2.
 
         A value that another program read up to `max_age` seconds ago is used instead. `within` is
         the timeout in seconds, from the end of the request to the start of the reply, for an
@@ -156,10 +156,11 @@ class ModbusLine(Protocol):
     ) -> float:
         """Write registers, once; returns when the answer came.
 
-        One word goes by function 6 and more by 16, unless `multiple` says which. A `replaceable`
-        write that a newer one of the same register overtook raises Superseded, unsent.
-        `forbidden` is asked just before the frame goes out; a reason that it gives is raised as
-        RequestRefused in its place. `within` as for a read.
+        One word goes by function 6 and more by 16, unless `multiple` says which. At the place of a
+        coil (wire_place() in tui.wire.frames) they are coils, by functions 5 and 15. A
+        `replaceable` write that a newer one of the same register overtook raises Superseded,
+        unsent. `forbidden` is asked just before the frame goes out; a reason that it gives is
+        raised as RequestRefused in its place. `within` as for a read.
         """
 
     async def read_write(

@@ -30,6 +30,8 @@ Number = Annotated[int, Meta(ge=0, le=MOST_NUMBERS)]
 StopCount = Annotated[int, Meta(ge=0, lt=STOPS_WRAP)]
 ByteValue = Annotated[int, Meta(ge=0, le=0xFF)]
 RegisterAddress = Annotated[int, Meta(ge=0, le=0xFFFF)]
+WrittenPlace = Annotated[int, Meta(ge=0, le=0x2FFFF)]
+"""A register, or a coil; see wire_place in tui.wire.frames."""
 RegisterValue = Annotated[int, Meta(ge=0, le=0xFFFF)]
 RegisterCount = Annotated[int, Meta(ge=0, le=0xFFFF)]
 Seconds = Annotated[float, Meta(ge=-1e9, le=1e9)]

@@ -139,7 +139,8 @@ class ExchangeError(LineError):
 def request_text(function: int, address: int | None) -> str:
     """Return a request as a text for a sentence about it."""
     if address is not None and function in _WITH_ADDRESS:
-        return f"function {function}, register {address}"
+        what = "coil" if function in _WITH_COIL else "input" if function == 2 else "register"
+        return f"function {function}, {what} {address}"
     return f"function {function}"
 
 
@@ -148,7 +149,8 @@ _WRONG_REPLY_BECAUSE = "Device {device} sent an unexpected reply ({request}): {d
 _REFUSED = "Device {device} refused {request} with exception {code}."
 _REFUSED_BECAUSE = "Device {device} refused {request} with exception {code}: {why}."
 
-_WITH_ADDRESS = frozenset({3, 4, 6, 16, 23})
+_WITH_COIL = frozenset({1, 5, 15})
+_WITH_ADDRESS = frozenset({2, 3, 4, 6, 16, 23, *_WITH_COIL})
 
 
 class NoAnswer(ExchangeError):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from tui.wire.frames import hex_text
 
@@ -24,6 +24,8 @@ class Expectation:
     function: int
     prefix: bytes
     length: int | None
+    padding: int = field(default=0, compare=False)
+    """Bits of the last byte that no coil has: they are 0. They distinguish no two replies."""
 
     def extent(self, data: bytes | bytearray, start: int = 0) -> int | None:
         """Length of the reply that begins at `start`, 0 if none does, None if bytes are missing."""
@@ -33,7 +35,8 @@ class Expectation:
         if len(head) < len(self.prefix):
             return None
         if self.length is not None:
-            return self.length
+            last = data[start + self.length - 1 : start + self.length]
+            return 0 if last and last[0] & self.padding else self.length
         if self.function == REPORT_ID:
             return 2 + data[start + 1] if len(data) > start + 1 else None
         return identification_extent(data, start)
@@ -49,6 +52,8 @@ class Expectation:
             return f"function {came} instead of {self.function}"
         if self.length is not None and len(pdu) != self.length:
             return f"{len(pdu)} bytes instead of {self.length}"
+        if pdu.startswith(self.prefix) and pdu[-1] & self.padding:
+            return "bits after the last coil are set"
         return f"{hex_text(pdu[1:6])} where {hex_text(self.prefix[1:])} was due"
 
 

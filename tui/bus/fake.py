@@ -22,7 +22,10 @@ import time
 from collections.abc import Callable, Coroutine, Mapping, Sequence
 from typing import Any, TypeVar
 
+from tui.wire.frames import BIT_READS, wire_place
+
 from .api import LineWorker
+from .coils import read_request, write_request
 from .errors import ExchangeError, LineClosed, LineError, LineLost, NoAnswer, RequestRefused
 from .expectation import IDENTIFY
 from .fake_device import FakeDevice, PlannedFailure
@@ -40,17 +43,7 @@ from .model import (
     Timing,
 )
 from .prepared import PreparedWrite
-from .requests import (
-    BROADCAST,
-    Diagnose,
-    Identify,
-    ReadWrite,
-    ReportId,
-    Request,
-    WriteOne,
-    read_request,
-    write_request,
-)
+from .requests import BROADCAST, Diagnose, Identify, ReadWrite, ReportId, Request
 from .schedule.pace import Pace
 from .shared_state import SharedState
 from .trace import Frame
@@ -61,8 +54,8 @@ T = TypeVar("T")
 class FakeLine:
     """Devices as dictionaries of registers, failures by address, and a log of requests.
 
-    `registers` are words by address by device; a device that is not among them is silent, an
-    address that it lacks is refused with exception 2.
+    `registers` are words by address by device, coils and inputs words of 0 or 1 by wire_place(). A
+    device that is not among them is silent, an address that it lacks is refused with exception 2.
     """
 
     def __init__(
@@ -173,7 +166,8 @@ class FakeLine:
         """Read registers; nothing is shared here, so each is read again."""
         held = self._device(device).held
         request = read_request(device, address, count, function)
-        words = await self._exchange(request, "read", lambda: held(address, count))
+        place = wire_place(function, address) if function in BIT_READS else address
+        words = await self._exchange(request, "read", lambda: held(place, count))
         return Reply(words, self._clock())
 
     async def write(
@@ -264,8 +258,8 @@ class FakeLine:
         for write in writes:
             self.requests.append(write.request)
             device = self._device(write.request.device)
-            if isinstance(write.request, WriteOne) and not device.silent:
-                device.take(write.request.address, [write.request.value])
+            if not device.silent:
+                device.take(*write.request.written)
         ended("")
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:

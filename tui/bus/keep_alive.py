@@ -17,7 +17,8 @@ import msgspec
 from msgspec import Meta
 
 from .bounds import MOST_DEVICES, MonotonicTime, RegisterAddress
-from .requests import Identify, Request, read_request
+from .coils import read_request
+from .requests import Identify, Request
 
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.08, 1e6
 """Seconds of a timeout that is kept; a line could not keep a shorter one."""
@@ -33,8 +34,8 @@ class KeepAlive(msgspec.Struct, frozen=True, tag=True):
     """Its communication timeout in seconds."""
     address: RegisterAddress = 0
     count: Annotated[int, Meta(ge=1, le=MOST_WORDS)] = 1
-    function: Literal[3, 4, 43] = 3
-    """3 and 4 read registers; 43 reads the identification."""
+    function: Literal[1, 2, 3, 4, 43] = 3
+    """1 and 2 read coils and inputs, 3 and 4 registers; 43 reads the identification."""
     until: MonotonicTime | None = None
     """Not beyond this time (monotonic); 0 ends it."""
 

@@ -9,6 +9,7 @@ from typing import Annotated
 from msgspec import Meta
 
 from .bounds import ByteValue, RegisterAddress, RegisterCount, Text
+from .coils import ReadCoils, ReadDiscrete, WriteCoil, WriteCoils
 from .requests import (
     BROADCAST,
     LISTEN_ONLY,
@@ -77,6 +78,10 @@ class Limits:
     broadcast_functions: ByteValues = frozenset()
     max_read_4: RegisterCount = 1
     """Words of one read by function 4."""
+    max_read_1: RegisterCount = 1
+    max_read_2: RegisterCount = 1
+    max_write_15: RegisterCount = 1
+    """Coils of one request, and discrete inputs of one read by function 2."""
     answers_all: bool = False
     """True if it refuses unknown registers; else it may be silent, also to a longer read."""
     exceptions: Annotated[Mapping[ByteValue, Text], Meta(max_length=256)] = field(
@@ -123,9 +128,10 @@ def out_of_range(request: Request) -> str:
         case Read(address=address, count=count):
             return _bad_span(address, count, MAX_READ)
         case WriteOne(address=address, value=value):
-            return _bad_span(address, 1, 1) or _bad_words((value,))
+            return _bad_span(address, 1, 1) or _bad_words((value,), _most_of(request))
         case WriteMany(address=address, values=values):
-            return _bad_span(address, len(values), MAX_WRITE) or _bad_words(values)
+            bad = _bad_span(address, len(values), MAX_WRITE)
+            return bad or _bad_words(values, _most_of(request))
         case ReadWrite(address=address, count=count, write_address=target, values=values):
             return (
                 _bad_span(address, count, MAX_READ_23)
@@ -148,16 +154,26 @@ def _bad_span(address: int, count: int, most: int) -> str:
     return ""
 
 
-def _bad_words(values: tuple[int, ...]) -> str:
+def _most_of(request: Request) -> int:
+    return 1 if isinstance(request, WriteCoil | WriteCoils) else 0xFFFF
+
+
+def _bad_words(values: tuple[int, ...], most: int = 0xFFFF) -> str:
     for value in values:
-        if not 0 <= value <= 0xFFFF:
-            return f"{value} does not fit in a word; words are 0 to 65535."
+        if not 0 <= value <= most:
+            return f"{value} does not fit in a word; words are 0 to {most}."
     return ""
 
 
 def _too_long(request: Request, limits: Limits) -> str:
     """Return why this device cannot be sent it although Modbus allows it."""
     match request:
+        case ReadDiscrete(count=count):
+            return _bad_bits("read", count, limits.max_read_2)
+        case ReadCoils(count=count):
+            return _bad_bits("read", count, limits.max_read_1)
+        case WriteCoils(values=values):
+            return _bad_bits("written", len(values), limits.max_write_15)
         case ReadInput(address=address, count=count):
             return _bad_block("read", address, count, limits.max_read_4, (), limits)
         case Read(address=address, count=count):
@@ -177,6 +193,12 @@ def _too_long(request: Request, limits: Limits) -> str:
                 return "Listen-only mode would silence the device until it is switched off."
             if subfunction not in limits.subfunctions:
                 return f"Device {request.device} has no sub-function {subfunction} of function 8."
+    return ""
+
+
+def _bad_bits(verb: str, count: int, most: int) -> str:
+    if count > most:
+        return f"{count} coils or inputs cannot be {verb} at once; the device accepts {most}."
     return ""
 
 

@@ -11,6 +11,7 @@ from functools import partial
 
 from tui.safety import LATE_REPLY
 
+from .coils import read_request, write_request
 from .errors import RequestRefused, WrongReply
 from .expectation import IDENTIFY
 from .limits import Limits, send_refusal
@@ -38,8 +39,6 @@ from .requests import (
     Request,
     diagnostic_of,
     own_words_of,
-    read_request,
-    write_request,
 )
 from .schedule.engine import Engine
 from .schedule.patience import Devices
@@ -152,7 +151,7 @@ class Line:
         max_age: float = 0.0,
         within: float | None = None,
     ) -> Reply:
-        """Read `count` registers by function 3, or input registers by 4.
+        """Read `count` registers by function 3, input registers by 4, coils by 1, inputs by 2.
 
         What was read for another program up to `max_age` seconds ago is taken in its place.
         `within` is in how many seconds the answer is to begin; see tui.bus.api.
@@ -175,11 +174,11 @@ class Line:
         """Write registers, once; returns when the answer came (line's clock, seconds).
 
         One word goes by function 6 and more by 16, unless `multiple` says which; a device with
-        only one of them gets that. The answer alone proves little: read back. A `replaceable`
-        write (a reference, never a command) raises Superseded without having been sent when a
-        newer one of the same register came while it waited. `forbidden` is asked in the line's
-        thread just before the frame goes out; where it gives a reason, RequestRefused is raised
-        in its place.
+        only one of them gets that. At the place of a coil they go by functions 5 and 15. The answer
+        alone proves little: read back. A `replaceable` write (a reference, never a command) raises
+        Superseded without having been sent when a newer one of the same register came while it
+        waited. `forbidden` is asked in the line's thread just before the frame goes out; where it
+        gives a reason, RequestRefused is raised in its place.
         """
         limits = self._devices[device].limits
         request = write_request(device, address, values, multiple, limits.functions)

@@ -23,11 +23,11 @@ USUAL_TURNAROUND = 0.005
 
 
 class PlannedRead(msgspec.Struct, frozen=True, array_like=True):
-    """One read of registers by function 3, or of input registers by 4."""
+    """One read of registers, or by another function of coils, inputs or input registers."""
 
     address: RegisterAddress
     count: Annotated[int, Meta(ge=1, le=125)]
-    function: Literal[3, 4] = 3
+    function: Literal[1, 2, 3, 4] = 3
 
 
 PlannedTurn = Annotated[tuple[PlannedRead, ...], Meta(min_length=1, max_length=MOST_READS)]

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 
 from tui.wire.frames import frame
 
+from .coils import write_request
 from .limits import Limits
 from .link import Link, TcpLink
 from .model import Priority
-from .requests import Request, write_request
+from .requests import Request
 from .share.carried import request_form
 from .share.messages import Asking, packed
 

@@ -25,7 +25,6 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterRequest,
 )
 
-from .errors import RequestRefused
 from .expectation import IDENTIFY, MEI_IDENTIFICATION, REPORT_ID, Expectation
 
 DATA_ECHOED = frozenset({0x00, 0x01, 0x03, 0x0A, 0x14})
@@ -63,7 +62,10 @@ class Request(ABC):
 
     @property
     def written(self) -> tuple[int, tuple[int, ...]]:
-        """The first register that the request writes, and the words; no words if it writes none."""
+        """The first place that the request writes, and the words; no words if it writes none.
+
+        A register is its own place, a coil has one behind all registers: see wire_place().
+        """
         return 0, ()
 
     def words(self, _pdu: bytes) -> tuple[int, ...]:
@@ -80,6 +82,8 @@ class Read(Request):
     """Function 3: read `count` registers."""
 
     function: ClassVar[int] = 3
+    step: ClassVar[int] = 1
+    """Registers or coils by which two replies must differ to differ in length."""
     address: int
     count: int
 
@@ -91,6 +95,11 @@ class Read(Request):
 
     def words(self, pdu: bytes) -> tuple[int, ...]:
         return words_of(pdu)
+
+    def pdu_of(self, words: Sequence[int]) -> bytes:
+        """The reply with these words."""
+        data = b"".join(word.to_bytes(2, "big") for word in words)
+        return bytes([self.function, len(data)]) + data
 
     @property
     def register(self) -> int:
@@ -105,11 +114,6 @@ class ReadInput(Read):
 
     def message(self) -> ModbusPDU:
         return ReadInputRegistersRequest(address=self.address, count=self.count)
-
-
-def read_request(device: int, address: int, count: int, function: int) -> Read:
-    """The request that reads by function 3 or 4."""
-    return (ReadInput if function == ReadInput.function else Read)(device, address, count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -256,27 +260,6 @@ class ReportId(Request):
 
     def expectation(self) -> Expectation:
         return Expectation(self.function, bytes([self.function]), None)
-
-
-def write_request(
-    device: int,
-    address: int,
-    values: Sequence[int],
-    multiple: bool | None,
-    functions: frozenset[int],
-) -> WriteOne | WriteMany:
-    """The request that writes the values by a function that the device supports; see Line.write.
-
-    Raises RequestRefused if function 6 alone cannot carry them.
-    """
-    if multiple is None:
-        one_word = WriteOne.function in functions or WriteMany.function not in functions
-        multiple = len(values) != 1 or not one_word
-    if multiple:
-        return WriteMany(device, address, tuple(values))
-    if len(values) != 1:
-        raise RequestRefused(f"Function 6 writes one word, not {len(values)}.")
-    return WriteOne(device, address, values[0])
 
 
 def _words_expected(function: int, count: int) -> Expectation:

@@ -1,4 +1,4 @@
-"""Message about registers of a device that a program on the line has written."""
+"""Message about registers or coils of a device that a program on the line has written."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 import msgspec
 from msgspec import Meta
 
-from .bounds import DeviceId, MonotonicTime, RegisterAddress, RegisterValue
+from .bounds import DeviceId, MonotonicTime, RegisterValue, WrittenPlace
 from .program import Program
 
 MOST_WRITTEN = 125
@@ -18,7 +18,7 @@ class DeviceWritten(msgspec.Struct, frozen=True, tag=True):
     """Registers that a device has acknowledged; device 0 is a broadcast, which none does."""
 
     device: DeviceId
-    address: RegisterAddress
+    address: WrittenPlace
     values: Annotated[tuple[RegisterValue, ...], Meta(max_length=MOST_WRITTEN)]
     program: Program
     time: MonotonicTime
@@ -26,5 +26,5 @@ class DeviceWritten(msgspec.Struct, frozen=True, tag=True):
 
     @property
     def words(self) -> dict[int, int]:
-        """The written words by address."""
+        """The written words by place; a coil is a word of 0 or 1."""
         return dict(enumerate(self.values, self.address))

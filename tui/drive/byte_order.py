@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from .profile.profile import Profile, is_verified
 from .profile.schema import Parameter, Quantity
-from .values import from_words, is_enumeration, is_field, raw_range, word_count
+from .values import from_words, is_enumeration, is_field, raw_range
+from .words import is_word
 
 USUAL_SETTINGS: tuple[Quantity, ...] = (
     "line_address",
@@ -54,7 +55,7 @@ def telling_codes(profile: Profile) -> tuple[str, ...]:
 
 def _has_limits(profile: Profile, parameter: Parameter) -> bool:
     """Return True if a manual states the valid values of this whole word."""
-    if word_count(parameter) != 1 or is_field(parameter) or parameter.bits:
+    if not is_word(parameter) or is_field(parameter) or parameter.bits:
         return False
     if not is_verified(parameter) or parameter.access == "w":
         return False

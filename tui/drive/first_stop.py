@@ -22,8 +22,9 @@ class FirstWord:
     """A word that stops every family that the drive may belong to."""
 
     address: int
+    """The place of its register or of its first coil, see wire_place()."""
     word: int
-    """The bits of the command word, 16 or 32."""
+    """The bits of the command word."""
     values: tuple[int, ...]
     """Words of the registers, in their order."""
     code: str
@@ -218,7 +219,7 @@ def _stops(chart: Chart) -> list[Order]:
 def _place(family: StopProfile, chart: Chart, order: Order) -> int | None:
     code = order.parameter or chart.command
     pair = family.pairs.get(code)
-    return family.places.get(code) if pair is None else pair.address
+    return family.places.get(code) if pair is None else pair.place
 
 
 def _values(family: StopProfile, chart: Chart, order: Order) -> tuple[int, ...]:

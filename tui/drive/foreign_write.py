@@ -22,6 +22,8 @@ from .settings.writable import cuts_line, is_order, is_setting, never_set
 from .values import check_raw, from_words, is_field, word_count
 from .words import unsigned
 
+WRITTEN_SPACES = (3, 1)
+"""Functions that read registers and coils: all else is only read."""
 ALL = "all"
 """Instead of codes: every setting that may be written without being named."""
 
@@ -43,6 +45,7 @@ class ExternalWord:
     """One word of a write, and the parameters at its address."""
 
     address: int
+    """Its register, or the place of a coil."""
     word: int
     kind: WordKind
     parameters: tuple[Parameter, ...] = ()
@@ -50,12 +53,12 @@ class ExternalWord:
 
 @lru_cache(maxsize=32)
 def _places(profile: Profile) -> Mapping[int, tuple[Parameter, ...]]:
-    """Return the parameters at each address; a two-word parameter is at both of its addresses."""
+    """Return the parameters at each place; one of several words or coils is at each of them."""
     places: dict[int, list[Parameter]] = {}
     for parameter in profile.parameters:
-        if parameter.function == 3:
-            for offset in range(word_count(parameter)):
-                places.setdefault(parameter.address + offset, []).append(parameter)
+        if parameter.function in WRITTEN_SPACES:
+            for place in registers_of(parameter):
+                places.setdefault(place, []).append(parameter)
     return {address: tuple(found) for address, found in places.items()}
 
 
@@ -121,13 +124,15 @@ def _bits(parameter: Parameter, words: Mapping[int, int]) -> int | None:
     pair = [words[address] for address in own]
     if len(pair) == 1:
         return pair[0]
+    if parameter.is_bits:
+        return from_words(parameter, pair)
     low, high = pair if parameter.low_word_first else reversed(pair)
     return high << 16 | low
 
 
 def registers_of(parameter: Parameter) -> range:
-    """Return the addresses of a parameter's registers."""
-    return range(parameter.address, parameter.address + word_count(parameter))
+    """Return the places of a parameter's registers or coils; a register's is its address."""
+    return range(parameter.place, parameter.place + word_count(parameter))
 
 
 @lru_cache(maxsize=32)
@@ -247,6 +252,8 @@ def half_refusal(parameter: Parameter, words: Mapping[int, int]) -> str:
     """Return why half of a value is not written; empty if all its words were sent."""
     if all(address in words for address in registers_of(parameter)):
         return ""
+    if parameter.is_bits:
+        return f"{parameter.code} has {parameter.words} coils. Write them in one request."
     return f"{parameter.code} has two words. Write both in one request."
 
 

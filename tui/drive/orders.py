@@ -156,8 +156,8 @@ def _ways_to_stop(profile: Profile) -> tuple[object, ...]:
     return tuple(
         (
             chart.when,
-            tuple(profile[code].address for code in chart.status_codes),
-            profile[chart.command].address if chart.command else None,
+            tuple(profile[code].place for code in chart.status_codes),
+            profile[chart.command].place if chart.command else None,
             tuple((s.id, s.kind, s.mask, s.value, tuple(s.also)) for s in chart.states),
             tuple(
                 (order.id, order.parameter, order.words, order.states, order.when)

@@ -13,7 +13,7 @@ from itertools import product
 
 from .errors import DriveError
 from .profile.profile import Profile
-from .profile.schema import Block, Parameter
+from .profile.schema import Block, Parameter, ReadFunction
 from .values import word_count
 
 REQUEST_CHARACTERS = 8
@@ -69,12 +69,12 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class ReadRequest:
-    """One request of function 3 or 4 and the parameters found in its reply."""
+    """One read and the parameters found in its reply."""
 
     address: int
     count: int
     places: tuple[Place, ...]
-    function: int = 3
+    function: ReadFunction = 3
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ from msgspec.structs import replace
 from .profile.profile import Profile, is_verified
 from .profile.schema import Chart, Parameter, Quantity, TeachableReference
 from .teaching import TaughtScale
-from .values import is_enumeration, word_count
+from .values import is_enumeration
+from .words import is_word
 
 REFERENCE_UNITS: Mapping[str, Quantity] = {"Hz": "command_frequency", "rpm": "command_speed"}
 """Units in which a reference can be given, and the quantity of its word."""
@@ -19,7 +20,7 @@ RUNS = frozenset({"forward", "reverse"})
 def why_not_taught(family: Profile, code: str) -> str:
     """Return why a parameter's scale cannot be taught; empty if it can."""
     parameter = family[code]
-    if parameter.access == "w" or parameter.bits or word_count(parameter) != 1:
+    if parameter.access == "w" or parameter.bits or not is_word(parameter):
         return f"{code} has no scale that can be learned: it is not a number of one word."
     if family.names(parameter) and is_enumeration(parameter):
         return f"{code} has no scale that can be learned: its values have names."
@@ -40,7 +41,7 @@ def is_raw(family: Profile, parameter: Parameter) -> bool:
     )
     reported = reported or bool(parameter.enumeration or parameter.bits) or parameter.scale != "1"
     reported = reported or parameter.offset != "0"
-    return not reported and (measured or not is_verified(parameter)) and word_count(parameter) == 1
+    return not reported and (measured or not is_verified(parameter)) and is_word(parameter)
 
 
 def teachable_codes(family: Profile) -> list[str]:

@@ -36,8 +36,11 @@ def _float_bits(parameter: Parameter, raw: int) -> int:
 
 
 def word_count(parameter: Parameter) -> int:
-    """Return the number of registers of the parameter: 1 or 2, up to 32 for a text."""
-    if parameter.type == "ascii":
+    """Return the number of registers, coils or inputs of the parameter.
+
+    A value has 1 or 2 registers, a text or a group of coils up to 32.
+    """
+    if parameter.type == "ascii" or parameter.is_bits:
         return parameter.words
     return 2 if parameter.type.endswith("32") else 1
 
@@ -45,8 +48,10 @@ def word_count(parameter: Parameter) -> int:
 def from_words(parameter: Parameter, words: Sequence[int]) -> int:
     """Return the raw value in the parameter's registers, by its sign, word order and bits.
 
-    Of a text, it is the bytes of the registers as one number.
+    Of a text, it is the bytes of the registers as one number; of coils, their bits.
     """
+    if parameter.is_bits:
+        return sum((bit & 1) << place for place, bit in enumerate(words[: parameter.words]))
     if parameter.type == "ascii":
         return int.from_bytes(struct.pack(f">{len(words)}H", *words), "big")
     if word_count(parameter) == 2:
@@ -96,6 +101,8 @@ def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[i
     low, high = type_range(parameter)
     if not low <= raw <= high:
         raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
+    if parameter.is_bits:
+        return tuple(raw >> place & 1 for place in range(parameter.words))
     if parameter.type == "ascii":
         return struct.unpack(f">{parameter.words}H", raw.to_bytes(2 * parameter.words, "big"))
     if word_count(parameter) == 1:
@@ -116,8 +123,18 @@ def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[i
 
 
 def type_bits(parameter: Parameter) -> int:
-    """Return all bits of the parameter's registers, set."""
-    return (1 << 16 * word_count(parameter)) - 1
+    """Return all bits of the parameter's registers or coils, set."""
+    return (1 << bit_count(parameter)) - 1
+
+
+def bit_count(parameter: Parameter) -> int:
+    """Return the number of bits of the parameter's registers, or of its coils."""
+    return word_count(parameter) * (1 if parameter.is_bits else 16)
+
+
+def is_word(parameter: Parameter) -> bool:
+    """Return True if the parameter is one register, or a part of one."""
+    return word_count(parameter) == 1 and not parameter.is_bits
 
 
 def unsigned(word: int) -> int:
@@ -126,8 +143,8 @@ def unsigned(word: int) -> int:
 
 
 def raw_of_word(parameter: Parameter, word: int) -> int:
-    """Return the raw value of a command word of 16 or 32 bits."""
-    return word if word_count(parameter) == 2 else from_words(parameter, [word & 0xFFFF])
+    """Return the raw value of a command word: of a register, a pair of them or coils."""
+    return from_words(parameter, [word & 0xFFFF]) if is_word(parameter) else word
 
 
 def registers_of_word(parameter: Parameter, word: int) -> tuple[int, ...]:
@@ -137,7 +154,7 @@ def registers_of_word(parameter: Parameter, word: int) -> tuple[int, ...]:
 
 def type_range(parameter: Parameter) -> tuple[int, int]:
     """Return the lowest and highest raw value that the parameter's type can hold."""
-    width = 16 * word_count(parameter)
+    width = bit_count(parameter)
     if is_field(parameter):
         return 0, parameter.mask
     if parameter.type == "float32":
@@ -149,5 +166,5 @@ def type_range(parameter: Parameter) -> tuple[int, int]:
 
 def hexadecimal(parameter: Parameter, raw: int) -> str:
     """Return the word or words of a raw value in hexadecimal: 16#0237, 16#00010237."""
-    digits = 4 * word_count(parameter)
+    digits = (bit_count(parameter) + 3) // 4
     return f"16#{raw & (1 << 4 * digits) - 1:0{digits}X}"

@@ -125,7 +125,8 @@ class CommunicationMap:
         """Codes of the monitored values that are not among the words."""
         profile = self.console.session.profile
         chosen = {word.address for word in self.own}
-        return [code for code in watched_first(profile) if profile[code].address not in chosen]
+        codes = [code for code in watched_first(profile) if profile[code].is_register]
+        return [code for code in codes if profile[code].address not in chosen]
 
     async def read_own(self) -> None:
         """Read the words. Raises the line's errors."""

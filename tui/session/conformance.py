@@ -27,6 +27,7 @@ from tui.drive.sentences import counted, first_of
 from tui.drive.shown import depends_on, number_of, shown_text
 from tui.drive.teaching import parse_display
 from tui.drive.values import check_raw, is_enumeration
+from tui.wire.frames import BIT_READS, SPACES
 
 from .drive import DriveSession
 from .read.retrying_reader import RetryingReader
@@ -217,12 +218,13 @@ class Conformance:
         session, data = self.session, request.data
         device, function = session.device, data[1]
         try:
-            if function in (3, 4):
+            if function in SPACES:
                 if not self._is_own(function, data):
                     return "Not sent: it is for a card with its own address."
                 address, count = (int.from_bytes(data[at : at + 2]) for at in (2, 4))
                 reply = await session.line.read(device, address, count, function=function)
-                return function, len(reply.words)
+                bits = function in BIT_READS
+                return function, (len(reply.words) + 7) // 8 if bits else len(reply.words)
             if function == IDENTIFY:
                 return function, len((await session.line.identify(device)).objects)
             if function == 8 and data[2:4] == b"\0\0":
@@ -249,8 +251,8 @@ def _form(reply: ExampleFrame) -> tuple[int, int]:
     function = data[1]
     if function & 0x80:
         return function, data[2]
-    if function in (3, 4):
-        return function, data[2] // 2
+    if function in SPACES:
+        return function, data[2] if function in BIT_READS else data[2] // 2
     return function, data[7] if function == 43 else 1
 
 
@@ -258,6 +260,8 @@ def _form_text(form: tuple[int, int]) -> str:
     function, size = form
     if function & 0x80:
         return f"exception {size}"
-    if function in (3, 4):
+    if function in BIT_READS:
+        return counted(size, "1 byte of bits", "{count} bytes of bits")
+    if function in SPACES:
         return counted(size, "1 word", "{count} words")
     return f"{size} objects" if function == 43 else "the echo of the request"

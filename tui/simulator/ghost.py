@@ -15,9 +15,10 @@ from tui.drive.profile.profile import Profile
 
 from .rules import Refusals, traits_of
 
-GHOST_READS = (3, 4)
-"""Functions that read words, whose values the record has by address."""
-GHOST_WRITES = (6, 16)
+GHOST_BITS = (1, 2)
+GHOST_READS = (*GHOST_BITS, 3, 4)
+"""Functions that read bits or words, whose values the record has by address."""
+GHOST_WRITES = (5, 6, 15, 16)
 ECHO_REQUEST = bytes([8, 0, 0])
 """Beginning of a request that is to be returned."""
 GHOST_REFUSALS = Refusals(1, 2, 2, 3, 4, 3)
@@ -106,7 +107,7 @@ class GhostDrive:
         if _is_good_read(item):
             assert item.reply is not None
             for place, address in enumerate(_addresses(item.request)):
-                word = item.reply[2 + 2 * place : 4 + 2 * place]
+                word = _value(item.reply, place)
                 track = self._words.setdefault((item.request[0], address), _Track())
                 track.add(item.at, item.took, word)
 
@@ -149,9 +150,10 @@ class GhostDrive:
             return None
         tracks = [self._words.get((pdu[0], address)) for address in _addresses(pdu)]
         known = [track.at(now)[1] for track in tracks if track is not None]
-        data = b"".join(word for word in known if word is not None)
-        if not tracks or len(data) != 2 * len(tracks):
+        words = [word for word in known if word is not None]
+        if not tracks or len(words) != len(tracks):
             return None
+        data = _packed(words) if pdu[0] in GHOST_BITS else b"".join(words)
         return bytes([pdu[0], len(data)]) + data
 
     def _refuse(self, pdu: bytes) -> GhostReply | None:
@@ -189,7 +191,20 @@ def _is_good_read(item: RecordedExchange) -> bool:
     request, reply = item.request, item.reply
     if request[0] not in GHOST_READS or reply is None or reply[0] != request[0]:
         return False
-    return len(reply) == 2 + 2 * len(_addresses(request))
+    count = len(_addresses(request))
+    return len(reply) == 2 + ((count + 7) // 8 if request[0] in GHOST_BITS else 2 * count)
+
+
+def _value(reply: bytes, place: int) -> bytes:
+    """Return a word of a reply, or a bit as one byte."""
+    if reply[0] in GHOST_BITS:
+        return bytes([reply[2 + place // 8] >> place % 8 & 1])
+    return reply[2 + 2 * place : 4 + 2 * place]
+
+
+def _packed(bits: Sequence[bytes]) -> bytes:
+    number = sum(bit[0] << place for place, bit in enumerate(bits))
+    return number.to_bytes((len(bits) + 7) // 8, "little")
 
 
 def _addresses(pdu: bytes) -> range:

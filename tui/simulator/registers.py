@@ -23,7 +23,7 @@ UNKEPT_QUANTITIES = frozenset(
 
 
 class Registers:
-    """Words by wire address, and parameters by code.
+    """Words by place (wire address and address space), and parameters by code.
 
     A written word is *present* at once. It is *in force* at once, or after the next power-up if the
     profile says so. It is *saved* at once if the drive writes its EEPROM, on command if the drive
@@ -192,10 +192,6 @@ def is_volatile(parameter: Parameter) -> bool:
     )
 
 
-INPUT_REGISTERS = 0x10000
-"""Offset of the address of an input register (function 4), a separate address space."""
-
-
 def typed_raw(parameter: Parameter, raw: int) -> int:
     """Return a raw value in the parameter's type, whether given signed or as a word.
 
@@ -211,8 +207,7 @@ def typed_raw(parameter: Parameter, raw: int) -> int:
 
 
 def _addresses(parameter: Parameter) -> range:
-    first = parameter.address + (INPUT_REGISTERS if parameter.function == 4 else 0)
-    return range(first, first + word_count(parameter))
+    return range(parameter.place, parameter.place + word_count(parameter))
 
 
 def _put_words(words: dict[int, int], parameter: Parameter, raw: int) -> None:

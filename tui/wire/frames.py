@@ -6,6 +6,38 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+SPACES = (3, 4, 1, 2)
+"""Functions that read the four address spaces: registers, input registers, coils, inputs."""
+BIT_READS = (1, 2)
+"""Functions whose replies have one bit for each coil or discrete input."""
+SPACE_SIZE = 0x10000
+
+COIL_ON = 0xFF00
+"""Word of function 5 that switches a coil on; 0 switches it off."""
+
+
+def wire_place(function: int, address: int) -> int:
+    """Return the place of an address: one number in all spaces, that of a register unchanged."""
+    return SPACES.index(function) * SPACE_SIZE + address
+
+
+def at_place(place: int) -> tuple[int, int]:
+    """Return the function that reads a place, and its address."""
+    return SPACES[place // SPACE_SIZE], place % SPACE_SIZE
+
+
+def packed_bits(bits: Sequence[int]) -> bytes:
+    """Return coils as on the wire: the first one in the lowest bit of the first byte."""
+    number = sum(1 << index for index, bit in enumerate(bits) if bit)
+    return number.to_bytes((len(bits) + 7) // 8, "little")
+
+
+def bits_of(data: bytes, count: int) -> tuple[int, ...]:
+    """Return the first coils of bytes from the wire."""
+    number = int.from_bytes(data, "little")
+    return tuple(number >> index & 1 for index in range(count))
+
+
 MIN_FRAME = 4
 MAX_FRAME = 256
 """Bytes of the shortest and the longest frame, checksum included."""

@@ -10,6 +10,8 @@ import struct
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from tui.wire.frames import BIT_READS, COIL_ON, at_place, bits_of, packed_bits, wire_place
+
 from ..expectation import IDENTIFY, MEI_IDENTIFICATION
 from ..limits import MAX_READ, MAX_READ_23, MAX_WRITE, MAX_WRITE_23
 
@@ -33,7 +35,7 @@ class Unanswerable(Exception):
 
 @dataclass(frozen=True, slots=True)
 class ReadRequested:
-    """Function 3 or 4."""
+    """Function 1, 2, 3 or 4."""
 
     function: int
     address: int
@@ -42,7 +44,10 @@ class ReadRequested:
 
 @dataclass(frozen=True, slots=True)
 class WriteRequested:
-    """Function 6, 16 or 23; the latter reads `count` words from `read_address` on afterwards."""
+    """Function 5, 6, 15, 16 or 23; the last reads `count` words from `read_address` on afterwards.
+
+    `address` is a register, or the place of a coil.
+    """
 
     function: int
     address: int
@@ -52,7 +57,7 @@ class WriteRequested:
 
     @property
     def words(self) -> Mapping[int, int]:
-        """Words to be written, by register."""
+        """Words to be written, by register or place of a coil."""
         return {self.address + offset: word for offset, word in enumerate(self.values)}
 
 
@@ -79,13 +84,20 @@ def parse_request(pdu: bytes) -> GatewayRequested:
     """Parse the bytes of a request. Raises Unanswerable."""
     function, data = pdu[0], pdu[1:]
     match function:
-        case 3 | 4:
+        case 1 | 2 | 3 | 4:
             address, count = _unpacked(">HH", data)
             _check_span(address, count, MAX_READ)
             return ReadRequested(function, address, count)
+        case 5:
+            address, value = _unpacked(">HH", data)
+            if value not in (0, COIL_ON):
+                raise Unanswerable(ILLEGAL_VALUE, f"coil value {value}")
+            return WriteRequested(function, wire_place(1, address), (value // COIL_ON,))
         case 6:
             address, value = _unpacked(">HH", data)
             return WriteRequested(function, address, (value,))
+        case 15:
+            return _write_coils(data)
         case 16:
             return _write_many(data)
         case 23:
@@ -100,13 +112,21 @@ def parse_request(pdu: bytes) -> GatewayRequested:
                 raise Unanswerable(ILLEGAL_VALUE)
             return IdentifyRequested(read_code, first)
         case _:
-            # no drive has coils or masked writes; an allowed function 5 would still go nowhere
+            # no drive has masked writes
             raise Unanswerable(ILLEGAL_FUNCTION, f"function {function}")
 
 
 def _write_many(data: bytes) -> WriteRequested:
     address, count, size = _unpacked(">HHB", data[:5])
     return WriteRequested(16, address, _values(address, count, size, data[5:], MAX_WRITE))
+
+
+def _write_coils(data: bytes) -> WriteRequested:
+    address, count, size = _unpacked(">HHB", data[:5])
+    _check_span(address, count, MAX_WRITE)
+    if size != (count + 7) // 8 or len(data) - 5 != size:
+        raise Unanswerable(ILLEGAL_VALUE, "a request of another length")
+    return WriteRequested(15, wire_place(1, address), bits_of(data[5:], count))
 
 
 def _read_write(data: bytes) -> WriteRequested:
@@ -145,14 +165,18 @@ def exception_pdu(function: int, code: int) -> bytes:
 
 
 def words_pdu(function: int, words: Sequence[int]) -> bytes:
-    """The answer of function 3, 4 or 23."""
+    """The answer of a read; a coil or input is a word of 0 or 1."""
+    if function in BIT_READS:
+        bits = packed_bits(words)
+        return bytes([function, len(bits)]) + bits
     return bytes([function, 2 * len(words)]) + struct.pack(f">{len(words)}H", *words)
 
 
 def written_pdu(requested: WriteRequested) -> bytes:
-    """The answer of function 6 or 16."""
-    second = requested.values[0] if requested.function == 6 else len(requested.values)
-    return struct.pack(">BHH", requested.function, requested.address, second)
+    """The answer of function 5, 6, 15 or 16."""
+    second = requested.values[0] if requested.function in (5, 6) else len(requested.values)
+    second *= COIL_ON if requested.function == 5 else 1
+    return struct.pack(">BHH", requested.function, at_place(requested.address)[1], second)
 
 
 def diagnosed_pdu(subfunction: int, data: int) -> bytes:

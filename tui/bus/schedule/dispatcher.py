@@ -7,10 +7,11 @@ import math
 from collections.abc import Callable
 from contextlib import suppress
 
+from ..coils import single_read
 from ..errors import LineBehind, LineClosed, LineError, LineFailed, LineLost, RequestRefused
 from ..master import ExchangeResult, Master, MonotonicClock, Piece, ResultKind, Sending
 from ..model import Priority, Reply, Timing
-from ..requests import Read, Request
+from ..requests import Request
 from ..shared_state import SharedState
 from ..tally import Tally
 from .alive_reads import AliveReads
@@ -256,8 +257,8 @@ class Dispatcher:
         Raises LineLost.
         """
         request = job.request
-        if Read.function in job.limits.functions:
-            probe = Read(request.device, request.register, 1)
+        probe = single_read(request)
+        if probe.function in job.limits.functions:
             await master.quiet()
             time_out = self._devices.time_out(request.device, probe.function, job.priority)
             probed = await master.exchange(

@@ -5,12 +5,14 @@ from __future__ import annotations
 from statistics import median
 
 from tui.safety import LATE_MARGIN, LONGEST_WAIT, MARGIN, MISSES, QUIET_SHARE
+from tui.wire.frames import SPACES
 
+from ..coils import WriteCoils
 from ..expectation import EXCEPTION, Expectation
 from ..limits import Limits
 from ..master import Piece, StrayKind
 from ..model import DeviceState, Priority, Timing
-from ..requests import Read, WriteMany
+from ..requests import WriteMany
 from .device_record import Device, Outstanding, note_turnaround, usual
 
 FORGET = 0.99
@@ -155,9 +157,9 @@ class Devices:
         ]
         sure = all(each.expectation.function != expectation.function for each in late)
         # a reply that repeats all of its request is as good from the same request before;
-        # that of function 16 says nothing of the values
+        # that of function 15 or 16 says nothing of the values
         whole = expectation.length == len(expectation.prefix)
-        whole = whole and expectation.function != WriteMany.function
+        whole = whole and expectation.function not in (WriteMany.function, WriteCoils.function)
         same = 0 if whole else sum(each.expectation == expectation for each in late)
         return sure, same
 
@@ -179,7 +181,7 @@ class Devices:
         """
         record = self[device]
         recent = record.recent.get(pdu[0], ())
-        if not self._mistakable or pdu[0] != Read.function or len(recent) < KNOWN:
+        if not self._mistakable or pdu[0] not in SPACES or len(recent) < KNOWN:
             return False
         if not any(reply == replied and pdu != sent for sent, replied in record.exchanges):
             return False

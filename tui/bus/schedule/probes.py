@@ -9,6 +9,7 @@ from secrets import randbelow
 
 from tui.safety import MISSES
 
+from ..coils import single_read
 from ..expectation import IDENTIFY, Expectation
 from ..limits import Limits, send_refusal
 from ..master import ExchangeResult, MonotonicClock, ResultKind
@@ -37,8 +38,8 @@ class Probes:
         """True once a reply came that the adapter's own echo cannot be."""
         self.silent: set[int] = set()
         """Drives that were silent to a longer read just now, and may always be."""
-        self._good: dict[int, dict[int, Read]] = {}
-        """By device and length, the read that was answered last."""
+        self._good: dict[int, dict[Expectation, Read]] = {}
+        """By device and form, the read that was answered last."""
 
     def sent(self, device: int) -> deque[Expectation]:
         """Replies that are due or may come late, and could be taken for one of this device."""
@@ -50,7 +51,7 @@ class Probes:
 
     def note_good(self, read: Read) -> None:
         """A read was answered: it can be a probe."""
-        self._good.setdefault(read.device, {})[read.count] = read
+        self._good.setdefault(read.device, {})[read.expectation()] = read
 
     def lengthen(self, job: Job) -> bool:
         """Lengthen a read, so that no earlier reply can be mistaken for its own."""
@@ -103,8 +104,9 @@ class Probes:
             yield Diagnose(request.device, ECHO, randbelow(1 << 16))
         if IDENTIFY in limits.functions and limits.answers_all:
             yield Identify(request.device)
-        if Read.function in limits.functions and not isinstance(request, Read):
-            yield (read := Read(request.device, request.register, 1))
+        read = single_read(request)
+        if read.function in limits.functions and not isinstance(request, Read):
+            yield read
             yield from self.forms.longer(read, limits)
 
 
@@ -143,7 +145,7 @@ class Forms:
     def longer(self, request: Read, limits: Limits) -> Iterator[Read]:
         """Reads of more registers from the same one on, shortest first; some may meet silence."""
         for more in range(1, MOST_MORE + 1):
-            form = replace(request, count=request.count + more)
+            form = replace(request, count=request.count + more * request.step)
             if form in self._refused or self._rests(form, SILENT_FOR):
                 return  # longer reads are refused too
             if not send_refusal(form, limits):
@@ -181,7 +183,7 @@ class Forms:
 
 def shorter(request: Read, limits: Limits) -> Iterator[Read]:
     """Reads of fewer registers from the same one on, longest first."""
-    for count in range(request.count - 1, 0, -1):
+    for count in range(request.count - request.step, 0, -request.step):
         form = replace(request, count=count)
         if not send_refusal(form, limits):
             yield form

@@ -75,8 +75,7 @@ class Job:
         """The reply as it would be if the request itself had been sent."""
         if not isinstance(self.request, Read) or self.form is None:
             return pdu
-        size = 2 * self.request.count
-        return bytes([pdu[0], size]) + pdu[2 : 2 + size]
+        return self.request.pdu_of(self.form.words(pdu)[: self.request.count])
 
     @property
     def tries(self) -> tuple[bytes, float | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..model import Reply
-from ..requests import BROADCAST, Read, ReadInput, Request
+from ..requests import BROADCAST, Read, Request
 
 
 class SharedValues:
@@ -35,7 +35,7 @@ class SharedValues:
 
         Only of words of one reply: two of different times could belong to two values.
         """
-        if type(request) not in (Read, ReadInput) or not isinstance(request, Read):
+        if not isinstance(request, Read):
             return None
         kept = self._words.get(request.device, {})
         first = kept.get((request.function, request.address))
@@ -47,5 +47,4 @@ class SharedValues:
             if word is None or word[1] != first[1]:
                 return None
             words.append(word[0])
-        data = b"".join(word.to_bytes(2, "big") for word in words)
-        return Reply(tuple(words), first[1], bytes([request.function, len(data)]) + data)
+        return Reply(tuple(words), first[1], request.pdu_of(words))

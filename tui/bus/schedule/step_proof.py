@@ -10,9 +10,10 @@ from __future__ import annotations
 import secrets
 from collections.abc import Callable
 
+from ..coils import single_read
 from ..master import ExchangeResult, Master, MonotonicClock, ResultKind, Sending
 from ..model import Priority
-from ..requests import BROADCAST, Diagnose, Read, Request
+from ..requests import BROADCAST, Diagnose, Request
 from .in_step import InStep
 from .outcomes import Outcomes
 from .patience import Devices
@@ -109,10 +110,11 @@ class StepProof:
         """
         device = job.request.device
         tries = self._tries[device] = self._tries.get(device, 0) + 1
-        if master.echo is None and tries < MOST_TRIES and Read.function in job.limits.functions:
+        read = single_read(job.request)
+        if master.echo is None and tries < MOST_TRIES and read.function in job.limits.functions:
             # a number that came back may be from an adapter that repeats what is sent; a read
             # tells, whatever its reply, unless another reply comes just then
-            result = await self._exchange(master, job, Read(device, job.request.register, 1))
+            result = await self._exchange(master, job, read)
         else:
             echo = Diagnose(device, ECHO, secrets.randbelow(1 << 16))
             result = await self._exchange(master, job, echo)

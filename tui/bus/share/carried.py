@@ -20,6 +20,7 @@ from ..bounds import (
     Text,
     Word,
 )
+from ..coils import ReadCoils, ReadDiscrete, WriteCoil, WriteCoils
 from ..errors import (
     ChecksumFault,
     DeviceException,
@@ -53,10 +54,11 @@ from ..requests import (
 
 MOST_PORTS = 64
 """Serial ports that a message names; more are left out."""
-REQUEST_KINDS: Mapping[str, type[Request]] = {
-    kind.__name__: kind
-    for kind in (Read, ReadInput, WriteOne, WriteMany, ReadWrite, Diagnose, Identify, ReportId)
-}
+_REQUESTS: tuple[type[Request], ...] = (
+    Read, ReadInput, ReadCoils, ReadDiscrete, WriteOne, WriteMany, WriteCoil, WriteCoils,
+    ReadWrite, Diagnose, Identify, ReportId,
+)  # fmt: skip
+REQUEST_KINDS: Mapping[str, type[Request]] = {kind.__name__: kind for kind in _REQUESTS}
 
 
 def request_form(request: Request) -> tuple[str, dict[str, Any]]:

@@ -41,7 +41,7 @@ from ..trace import Frame
 from ..written import DeviceWritten
 from .carried import ErrorForm, Polled, Subscribe, Unsubscribe
 
-VERSION = 10
+VERSION = 11
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 22
 """Bytes of one message; a longer message is invalid."""

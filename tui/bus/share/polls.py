@@ -12,12 +12,12 @@ from dataclasses import dataclass, field
 from tui.safety import SHARED_AGE
 
 from ..bounds import MOST_DEVICES, MOST_STRETCH
+from ..coils import read_request
 from ..errors import DeviceException, LineError, RequestRefused
 from ..limits import CAUTIOUS, Limits, send_refusal
 from ..link import character_time, silence
 from ..model import Priority, Reply
 from ..poll_plan import USUAL_TURNAROUND, PlannedRead, PolledTurn, PollPlan, Subscription
-from ..requests import read_request
 from ..schedule.inside import LineInside
 from ..schedule.pace import SHARE, greatest
 from ..schedule.queue import Job
@@ -282,7 +282,7 @@ def _answer_of(
     """Return the reply or error in a message for one read. Raises NoMessage."""
     if reply.failure is not None:
         return error_from(reply.failure)
-    if len(reply.pdu) != 2 + 2 * count or reply.pdu[:2] != bytes([function, 2 * count]):
-        raise NoMessage("a reply of another length")
     request = read_request(device, address, count, function)
+    if not request.expectation().fits(reply.pdu):
+        raise NoMessage("a reply of another length")
     return Reply(request.words(reply.pdu), reply.time, reply.pdu)

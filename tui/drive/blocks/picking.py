@@ -53,7 +53,7 @@ def raw_named(profile: Profile, block: Block, text: str) -> int:
 def choices(profile: Profile, block: Block | None, search: str = "") -> list[Parameter]:
     """Return the parameters that a slot of the block can select, best matches first.
 
-    Without a block, these are all parameters that can be read.
+    Without a block, these are all registers that can be read.
 
     A search finds codes, numbers, addresses and names; each result contains all words of the
     search.
@@ -63,7 +63,7 @@ def choices(profile: Profile, block: Block | None, search: str = "") -> list[Par
     else:
         offered = sorted(profile.parameters, key=lambda parameter: parameter.address)
     if block is None:
-        fitting = [p for p in offered if p.access != "w"]
+        fitting = [p for p in offered if p.access != "w" and p.is_register]
     else:
         fitting = [p for p in offered if not reason_against(profile, block, p)]
     if not search.split():

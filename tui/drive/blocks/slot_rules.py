@@ -105,6 +105,8 @@ def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
     if block.selects_by == "choice" and code not in {c.parameter for c in block.choices}:
         codes = ", ".join(choice.parameter for choice in block.choices)
         return f"{block.name} cannot hold {code}. It can hold {codes}."
+    if parameter.is_bits:
+        return f"{code} is on coils or discrete inputs; a slot holds a register."
     if word_count(parameter) != 1:
         return f"{code} has two words; a slot holds one."
     if parameter.address == UNUSED:

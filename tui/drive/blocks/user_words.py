@@ -58,6 +58,10 @@ def word_named(profile: Profile, text: str, format: WordFormat = "hex") -> UserW
     parameter = profile.find(wanted)
     if parameter.access == "w":
         raise MappingError(f"{parameter.code} can only be written; it has no value to show.")
+    if not parameter.is_register:
+        raise MappingError(
+            f"{parameter.code} is not a holding register. Only those are shown here."
+        )
     return UserWord(parameter.address, format)
 
 

@@ -177,7 +177,8 @@ def stretches(
 
     Each parameter counts for one read only. Empty if the drive reads single words only.
     """
-    left = sorted((profile[code] for code in dict.fromkeys(codes)), key=lambda p: p.address)
+    wanted = (profile[code] for code in dict.fromkeys(codes))
+    left = sorted((p for p in wanted if p.is_register), key=lambda p: p.address)
     found: list[Stretch] = []
     while left:
         runs = (

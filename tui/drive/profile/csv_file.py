@@ -77,6 +77,7 @@ code = {code}
 name = "{name}"
 {limit} = 2
 """
+_FURTHER = {1: "Read coils", 2: "Read discrete inputs", 4: "Read input registers"}
 
 
 def profile_from_table(text: str, new_id: str, file: str) -> str:
@@ -101,8 +102,12 @@ def _profile_of(rows: list[dict[str, Any]], new_id: str) -> str:
             f"{new_id!r} is not an id. Use small letters, digits, - and _, with a letter first."
         )
     more, most = "", 1
-    if any(row.get("function") == 4 for row in rows):
-        more += _FUNCTION.format(code=4, name="Read input registers", limit="max_read")
+    read = {row.get("function") for row in rows}
+    for code, name in _FURTHER.items():
+        if code in read:
+            more += _FUNCTION.format(code=code, name=name, limit="max_read")
+    if any(row.get("function") == 1 and row["access"] != "r" for row in rows):
+        more += _FUNCTION.format(code=5, name="Write single coil", limit="max_write")
     if any(str(row.get("type", "")).endswith("32") for row in rows):
         more += _FUNCTION.format(code=16, name="Write registers", limit="max_write")
         most = 2
@@ -167,8 +172,8 @@ def _converted(row: dict[str, str]) -> dict[str, Any]:
     if address := row.get("address"):
         found["address"] = _address(address)
     if function := row.get("function"):
-        if function not in ("3", "4"):
-            raise ValueError(f"{code}: function {function!r} is not 3 or 4.")
+        if function not in ("1", "2", "3", "4"):
+            raise ValueError(f"{code}: function {function!r} is not 1, 2, 3 or 4.")
         found["function"] = int(function)
     found |= {f: _field(code, f, row[f]) for f in ("mask", "shift") if f in row}
     found |= {f: row[f] for f in ("type", "unit") if f in row}

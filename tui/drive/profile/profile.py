@@ -12,6 +12,8 @@ from hashlib import sha256
 
 import msgspec
 
+from tui.wire.frames import SPACES
+
 from ..errors import ProfileError, UnknownParameter
 from ..teaching import TaughtScale
 from .schema import (
@@ -167,7 +169,7 @@ class Profile:
     def at(self, address: int, function: int = 3) -> Parameter | None:
         """Return the parameter at a wire address, the first one if several share it; None if none.
 
-        `function` is 4 for an input register.
+        `function` is 4 for an input register, 1 for a coil, 2 for a discrete input.
         """
         return self._by_address.get((function, address))
 
@@ -211,8 +213,9 @@ class Profile:
         if exact is not None:
             return exact
         address = parse_address(wanted)
-        if address is not None and (found := self.at(address) or self.at(address, 4)):
-            return found
+        found = (self.at(address, space) for space in SPACES) if address is not None else ()
+        if (at_address := next(filter(None, found), None)) is not None:
+            return at_address
         near = difflib.get_close_matches(wanted.casefold(), self._by_folded, n=3, cutoff=0.5)
         hint = ", ".join(dict.fromkeys(self._by_folded[n].code for n in near))
         way = f"Did you mean {hint}?" if hint else "Type a code, W9001, 16#2329 or 9001."
@@ -296,7 +299,12 @@ def parse_address(text: str) -> int | None:
 
 def notations(parameter: Parameter) -> tuple[str, str, str]:
     """Return the three notations of a parameter: drive code, manual's number, wire address."""
-    return parameter.code, parameter.number, f"{parameter.address} (16#{parameter.address:04X})"
+    kind = f"{_KINDS[parameter.function]} " if parameter.is_bits else ""
+    wire = f"{kind}{parameter.address} (16#{parameter.address:04X})"
+    return parameter.code, parameter.number, wire
+
+
+_KINDS = {1: "coil", 2: "input"}
 
 
 def _unique(parameters: Iterable[Parameter]) -> dict[str, Parameter]:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from tui.wire.frames import crc16
+from tui.wire.frames import BIT_READS, SPACES, bits_of, crc16
 
 from .schema import ProfileFrame
 
-READING, WRITING_ONE, WRITING_SEVERAL = (3, 4), 6, 16
+READING, WRITING_COIL, WRITING_ONE, WRITING_COILS, WRITING_SEVERAL = SPACES, 5, 6, 15, 16
 
 
 class FrameError(ValueError):
@@ -22,9 +22,11 @@ class FrameContents(NamedTuple):
     """Request without address and checksum."""
     reply: bytes
     function: int
+    space: int
+    """Function that reads the address space."""
     address: int
     words: tuple[int, ...]
-    """Words that are read or written, from the address on."""
+    """Words or coils that are read or written, from the address on."""
 
 
 def frame_contents(frame: ProfileFrame) -> FrameContents:
@@ -34,9 +36,19 @@ def frame_contents(frame: ProfileFrame) -> FrameContents:
         raise FrameError("answered is from another drive, or of another function.")
     request, reply = sent[1:], answered[1:]
     function, address = request[0], int.from_bytes(request[1:3], "big")
+    space = 1 if function in (WRITING_COIL, WRITING_COILS) else 3
+    count = int.from_bytes(request[3:5], "big")
+    if function in BIT_READS or function == WRITING_COILS:
+        bits = reply[2:] if function in BIT_READS else request[6:]
+        if len(bits) != (count + 7) // 8:
+            raise FrameError("it has another number of bits than sent.")
+        space = function if function in BIT_READS else space
+        return FrameContents(request, reply, function, space, address, bits_of(bits, count))
+    if function == WRITING_COIL:
+        return FrameContents(request, reply, function, space, address, (int(count != 0),))
     if function in READING:
-        data = reply[2:]
-        if len(data) != reply[1] or len(data) != 2 * int.from_bytes(request[3:5], "big"):
+        space, data = function, reply[2:]
+        if len(data) != reply[1] or len(data) != 2 * count:
             raise FrameError("answered has another number of words than sent.")
     elif function == WRITING_ONE:
         data = request[3:5]
@@ -45,7 +57,7 @@ def frame_contents(frame: ProfileFrame) -> FrameContents:
     else:
         raise FrameError(f"function {function} neither reads nor writes registers.")
     words = tuple(int.from_bytes(data[at : at + 2], "big") for at in range(0, len(data), 2))
-    return FrameContents(request, reply, function, address, words)
+    return FrameContents(request, reply, function, space, address, words)
 
 
 def _unsealed(key: str, text: str) -> bytes:

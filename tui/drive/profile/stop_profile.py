@@ -16,7 +16,7 @@ import msgspec
 
 from ..errors import ProfileError
 from ..small_file import read_small_text
-from ..words import word_count
+from ..words import is_word, word_count
 from . import library
 from .converting import converted
 from .heads import section, shared_texts
@@ -28,6 +28,7 @@ _CODE = re.compile(r"""^code = (["'])(.+)\1$""", re.MULTILINE)
 _ADDRESS = re.compile(r"^address = (\d+)$", re.MULTILINE)
 _TABLE = re.compile(r"^\[", re.MULTILINE)
 _ODD = re.compile(r"^(?:function|mask|shift|type) = ", re.MULTILINE)
+_BITS = re.compile(r"^function = [12]$", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,9 +39,10 @@ class StopProfile:
     name: str
     charts: tuple[Chart, ...]
     places: Mapping[str, int]
-    """Address by code, of whole words that function 3 reads."""
+    """Place by code (wire_place), of whole registers that function 3 reads, and of single coils and
+    inputs."""
     pairs: Mapping[str, Parameter]
-    """Command words of 32 bits by code; no packaged family has one."""
+    """Command words of 32 bits or of coils by code; no packaged family has one."""
     names_itself: bool
     """True if its drives support function 43; others do not answer reads of words that they
     lack."""
@@ -73,13 +75,16 @@ def _facts(listing: library.Listing) -> StopProfile | None:
 def stop_profile_of(profile: Profile, *, names_itself: bool = True) -> StopProfile:
     """Return the stop profile of a loaded family."""
     places = {
-        parameter.code: parameter.address
+        parameter.code: parameter.place
         for parameter in profile.parameters
-        if parameter.function == 3 and parameter.type.endswith("16") and parameter.mask == 0xFFFF
+        if parameter.function != 4
+        and word_count(parameter) == 1
+        and parameter.type.endswith("16")
+        and parameter.mask == 0xFFFF
     }
     charts = tuple(profile.data.charts)
     codes = {order.parameter or chart.command for chart in charts for order in chart.orders}
-    pairs = {code: profile[code] for code in codes if word_count(profile[code]) == 2}
+    pairs = {code: profile[code] for code in codes if not is_word(profile[code])}
     return StopProfile(profile.id, profile.name, charts, places, pairs, names_itself)
 
 
@@ -90,8 +95,8 @@ def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:
     except (OSError, UnicodeDecodeError):
         return None
     head, rows = section(text, "profile"), section(text, "charts")
-    by_rule = '\naddress = "' in text
-    if not isinstance(head, dict) or not rows or "without" in head or by_rule:
+    odd = '\naddress = "' in text or _BITS.search(text)
+    if not isinstance(head, dict) or not rows or "without" in head or odd:
         return None
     shared = shared_texts(head, path.parent) if "rows_from" in head else []
     if shared is None or any("[[charts]]" in item for item in shared):

@@ -16,10 +16,11 @@ from tui.drive.sentences import counted
 from tui.drive.shown import shown
 from tui.drive.values import from_words, word_count
 from tui.session.listening.words import FUNCTION_NAMES
-from tui.wire.frames import Pdu, pdu_of
+from tui.wire.frames import BIT_READS, COIL_ON, SPACES, Pdu, bits_of, pdu_of
 from tui.wire.observed.pairing import BROADCAST_DEVICE
 
-READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE = 3, 4, 6, 16, 23
+READ_COILS, READ, WRITE_COIL, WRITE_ONE, WRITE_COILS, WRITE_MANY = 1, 3, 5, 6, 15, 16
+READ_WRITE = 23
 EXCEPTION_BIT = 0x80
 CODES_OF_FRAME = 3
 """Maximum parameters of a request that are named; further ones are counted."""
@@ -66,7 +67,8 @@ def decoded(
         if pdu is None:
             found.append("")
             continue
-        space = READ_INPUT if pdu.function == READ_INPUT else READ
+        own = READ_COILS if pdu.function in (WRITE_COIL, WRITE_COILS) else READ
+        space = pdu.function if pdu.function in SPACES else own
         device = pdu.device
         guesses = guesses_of(device) if frame.direction == "in" else ()
         words = _Words(device, profile_of(device), raws_of(device), space, guesses)
@@ -82,7 +84,7 @@ def decoded(
 
 
 def _requested(pdu: Pdu) -> DecodedRequest | None:
-    if pdu.function not in (READ, READ_INPUT, READ_WRITE):
+    if pdu.function not in (*SPACES, READ_WRITE):
         return None
     address, count = struct.unpack_from(">HH", pdu.body)
     return DecodedRequest(pdu.device, pdu.function, address, count)
@@ -92,12 +94,14 @@ def _request(pdu: Pdu, words: _Words) -> str:
     who, name = pdu.device or "all", FUNCTION_NAMES.get(pdu.function, f"function {pdu.function}")
     head = f"{who} {name}"
     match pdu.function:
-        case 3 | 4:
+        case 1 | 2 | 3 | 4:
             address, count = struct.unpack_from(">HH", pdu.body)
             return f"{head} {words.names(address, count)}"
-        case 6:
-            address, raw = struct.unpack_from(">HH", pdu.body)
-            return f"{head} {words.values(address, [raw], '←')}"
+        case 5 | 6:
+            return f"{head} {words.values(*_one(pdu), '←')}"
+        case 15:
+            address, count = struct.unpack_from(">HH", pdu.body)
+            return f"{head} {words.values(address, bits_of(pdu.body[5:], count), '←')}"
         case 16:
             address, count = struct.unpack_from(">HH", pdu.body)
             raws = struct.unpack_from(f">{count}H", pdu.body, 5)
@@ -114,17 +118,22 @@ def _reply(pdu: Pdu, requested: DecodedRequest | None, words: _Words) -> str:
         function = pdu.function & ~EXCEPTION_BIT
         name = FUNCTION_NAMES.get(function, f"function {function}")
         return f"{pdu.device} refuses {name}: exception {pdu.body[0]}"
-    if pdu.function in (READ, READ_INPUT, READ_WRITE):
-        raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
-        if requested is None or (requested.device, requested.function) != (
+    if pdu.function in (*SPACES, READ_WRITE):
+        known = requested is not None and (requested.device, requested.function) == (
             pdu.device,
             pdu.function,
-        ):
-            return f"{pdu.device} {len(raws)} words"
+        )
+        if pdu.function in BIT_READS:
+            count = requested.count if known and requested is not None else 8 * pdu.body[0]
+            raws = bits_of(pdu.body[1:], count)
+        else:
+            raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
+        if requested is None or not known:
+            return f"{pdu.device} {len(raws)} {'bits' if pdu.function in BIT_READS else 'words'}"
         return f"{pdu.device} {words.values(requested.address, raws)}"
-    if pdu.function == WRITE_ONE:
+    if pdu.function in (WRITE_COIL, WRITE_ONE):
         return f"{pdu.device} wrote {words.values(*_one(pdu))}"
-    if pdu.function == WRITE_MANY:
+    if pdu.function in (WRITE_COILS, WRITE_MANY):
         address, count = struct.unpack_from(">HH", pdu.body)
         return f"{pdu.device} wrote {words.names(address, count)}"
     return f"{pdu.device} {FUNCTION_NAMES.get(pdu.function, f'function {pdu.function}')}"
@@ -132,7 +141,7 @@ def _reply(pdu: Pdu, requested: DecodedRequest | None, words: _Words) -> str:
 
 def _one(pdu: Pdu) -> tuple[int, list[int]]:
     address, raw = struct.unpack_from(">HH", pdu.body)
-    return address, [raw]
+    return address, [int(raw == COIL_ON) if pdu.function == WRITE_COIL else raw]
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,6 +160,8 @@ class _Words:
         named = [code for code in found if code]
         if not named:
             single, several = "{at} (16#{at:04x}), 1 word", "{at} (16#{at:04x}), {count} words"
+            if self.function in BIT_READS:
+                single, several = "{at} (16#{at:04x}), 1 bit", "{at} (16#{at:04x}), {count} bits"
             return counted(count, single, several, at=address)
         more = len(found) - CODES_OF_FRAME
         codes = " ".join(code or "?" for code in found[:CODES_OF_FRAME])
@@ -170,7 +181,8 @@ class _Words:
         while at < len(raws):
             parameter = self.profile.at(address + at, self.function) if self.profile else None
             if parameter is None or self.profile is None:
-                yield "", f"16#{raws[at]:04X}", str(address + at)
+                bit = self.function in BIT_READS
+                yield "", str(raws[at]) if bit else f"16#{raws[at]:04X}", str(address + at)
                 at += 1
                 continue
             wide = word_count(parameter)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rich.text import Text
 
+from tui.drive.profile.profile import notations
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.factory import factory_is_sure
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
@@ -145,7 +146,8 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
     raw, edit = editor.values.raws.get(parameter.code), editor.staging.edits.get(parameter.code)
     hexadecimal = f"16#{parameter.address:04X}"
     number = parameter.number if parameter.number not in (hexadecimal, parameter.code) else ""
-    parts = [part for part in (number, hexadecimal, str(parameter.address)) if part]
+    wire = notations(parameter)[2].partition(" (")[0]
+    parts = [part for part in (number, hexadecimal, wire) if part]
     if parameter.eeprom_address is not None:
         parts.append(f"EEPROM 16#{parameter.eeprom_address:04X}")
     if raw is not None and parameter.type != "ascii":

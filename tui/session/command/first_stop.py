@@ -19,15 +19,19 @@ from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 from tui.drive.profile.stop_profile import StopProfile, stop_profile_of
 from tui.drive.sentences import any_of
+from tui.wire.frames import at_place
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
 
 ONE_WORD = Limits(
-    functions=frozenset({3, 6, 43}), max_read=1, max_write=1, max_read_23=0, max_write_23=0
+    functions=frozenset({1, 2, 3, 5, 6, 43}), max_read=1, max_write=1, max_read_23=0, max_write_23=0
 )
 """Requests allowed to an unidentified drive."""
-STOP_OF_32_BITS = replace(ONE_WORD, functions=ONE_WORD.functions | {16}, max_write=2)
+STOP_OF_SEVERAL = replace(
+    ONE_WORD, functions=ONE_WORD.functions | {15, 16}, max_write=2, max_write_15=16
+)
+"""The same for a command word of 32 bits or of several coils."""
 FIRST_WHY = "stopped before it was identified"
 
 
@@ -159,16 +163,21 @@ async def _look(line: ModbusLine, device: int, place: StopPlace, *, again: bool)
     return _Look(there, raws)
 
 
-async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> int:
+async def _read(line: ModbusLine, device: int, place: int, *, again: bool) -> int:
     """Read a word; with `again`, once more if there was no valid reply."""
     try:
-        reply = await line.read(device, address, 1, priority=Priority.STOP)
+        return await _read_once(line, device, place)
     except DeviceException:
         raise
     except ExchangeError:
         if not again:
             raise
-        reply = await line.read(device, address, 1, priority=Priority.STOP)
+        return await _read_once(line, device, place)
+
+
+async def _read_once(line: ModbusLine, device: int, place: int) -> int:
+    function, address = at_place(place)
+    reply = await line.read(device, address, 1, priority=Priority.STOP, function=function)
     return reply.words[0]
 
 
@@ -176,7 +185,7 @@ async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord
     """Write the word once, and record it in the journal whatever the result."""
     answer = reported = "interrupted by a signal: it is not known if the drive received it"
     if len(what.values) > 1:
-        line.describe(device, STOP_OF_32_BITS)
+        line.describe(device, STOP_OF_SEVERAL)
     try:
         await line.write(device, what.address, what.values, priority=Priority.STOP)
         answer = reported = "ok"
@@ -206,7 +215,7 @@ def _entry(line: ModbusLine, device: int, what: FirstWord, answer: str) -> Entry
         device=device,
         profile=",".join(family.id for family in what.families),
         code=what.code,
-        address=what.address,
+        address=at_place(what.address)[1],
         old_raw=None,
         old="",
         new_raw=what.word,

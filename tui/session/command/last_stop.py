@@ -12,10 +12,10 @@ from functools import partial
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineError, LineFailed, LineLost
 from tui.bus.link import label
-from tui.bus.requests import WriteMany, WriteOne
 from tui.drive.errors import DriveError
 from tui.drive.sentences import sentence
 from tui.drive.values import from_words
+from tui.wire.frames import at_place
 
 from ..carry_on import carried_on
 from ..drive import DriveSession
@@ -99,11 +99,11 @@ class LastStop:
         session.reported_by_line = True
         for write in session.prepared:
             request = write.request
-            if not isinstance(request, WriteOne | WriteMany):
+            place, values = request.written
+            if not values:
                 continue
-            address = request.address
-            values = (request.value,) if isinstance(request, WriteOne) else request.values
-            parameter = session.profile.at(address)
+            function, address = at_place(place)
+            parameter = session.profile.at(address, function)
             code, word = str(address), values[0]
             if parameter is not None:
                 code, word = parameter.code, from_words(parameter, values)

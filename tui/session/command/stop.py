@@ -262,7 +262,7 @@ class Stopper:
                 continue
             target = order_target(session.profile, chart, found)
             for word in found.words:
-                place = (target.address, registers_of_word(target, word))
+                place = (target.place, registers_of_word(target, word))
                 if place not in sent:
                     sent.add(place)
                     limits = limits_of(session.profile)

@@ -11,12 +11,16 @@ def limits_of(profile: Profile) -> Limits:
     """Return the requests allowed to a drive of this family; the line refuses all others."""
     functions = {function.code: function for function in profile.data.functions}
     read, inputs, write, both = (functions.get(code) for code in (3, 4, 16, 23))
+    coils, bits, write_coils = (functions.get(code) for code in (1, 2, 15))
     diagnose, reading = functions.get(8), profile.data.reading
     return Limits(
         functions=frozenset(functions),
         max_read=(read.max_read if read else None) or 1,
         max_write=(write.max_write if write else None) or 1,
         max_read_4=(inputs.max_read if inputs else None) or 1,
+        max_read_1=(coils.max_read if coils else None) or 1,
+        max_read_2=(bits.max_read if bits else None) or 1,
+        max_write_15=(write_coils.max_write if write_coils else None) or 1,
         max_read_23=(both.max_read if both else None) or 0,
         max_write_23=(both.max_write if both else None) or 0,
         answers_all=read is not None and read.past_limit != "silence",

@@ -37,7 +37,7 @@ from tui.drive.orders import chart_codes
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import AT_REST, needs_standstill
 from tui.drive.shown import depends_on
-from tui.drive.values import from_words, word_count
+from tui.drive.values import from_words
 from tui.safety import CLIENT_WRITE_ARMED_FOR, JUST_READ
 
 from ..drive import DriveSession
@@ -103,9 +103,7 @@ class GatewayWrite:
         own = {chart.command for chart in profile.data.charts}
         codes = stop_deciding_codes(profile, self._requested.words)
         deciding = [profile.find(code) for code in codes if code not in own]
-        registers = {
-            parameter.address + i for parameter in deciding for i in range(word_count(parameter))
-        }
+        registers = {register for parameter in deciding for register in registers_of(parameter)}
         return not self._line.pending.changes_before(self._write, registers)
 
     async def _read(self, codes: list[str]) -> Mapping[str, int]:
@@ -194,7 +192,7 @@ class GatewayWrite:
     async def _send_alone(self, item: ExternalWord) -> None:
         """Send one word that stops; both, if its parameter has two."""
         device = self._session.device
-        if item.address not in {parameter.address for parameter in item.parameters}:
+        if item.address not in {parameter.place for parameter in item.parameters}:
             return  # sent with the first word of its parameter
         word, send = (device, item.address, item.word), partial(self._send_alone_now, item)
         await self._line.turns.stopping(self._host, word, send)
@@ -267,7 +265,7 @@ class GatewayWrite:
             return words_pdu(23, reply.words)
         await session.line.write(
             session.device, requested.address, requested.values,
-            priority=priority, multiple=requested.function == 16, forbidden=forbidden,
+            priority=priority, multiple=requested.function in (15, 16), forbidden=forbidden,
         )  # fmt: skip
         return written_pdu(requested)
 
@@ -306,7 +304,7 @@ class GatewayWrite:
         session, words = self._session, self._requested.words
         why = f"{what} of Modbus TCP client {self._client}"
         for parameter in parameters:
-            own = [parameter.address + offset for offset in range(word_count(parameter))]
+            own = registers_of(parameter)
             if any(address not in words for address in own):
                 continue
             held = before.get(parameter.code)

@@ -11,20 +11,21 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.shown import shown
 from tui.drive.values import Value, from_words, word_count
+from tui.wire.frames import BIT_READS, COIL_ON, SPACES, bits_of
 from tui.wire.observed.pairing import ObservedExchange
 
-HOLDING, INPUT = 3, 4
-WRITE_WORD, WRITE_WORDS, READ_AND_WRITE, WHO = 6, 16, 23, 43
+COILS, HOLDING, INPUT = 1, 3, 4
+WRITE_COIL, WRITE_WORD, WRITE_COILS, WRITE_WORDS, READ_AND_WRITE, WHO = 5, 6, 15, 16, 23, 43
 FUNCTION_NAMES: Mapping[int, str] = {
-    1: "read coils",
+    COILS: "read coils",
     2: "read inputs",
     HOLDING: "read",
     INPUT: "read input",
-    5: "write coil",
+    WRITE_COIL: "write coil",
     WRITE_WORD: "write",
     7: "exception status",
     8: "diagnostics",
-    15: "write coils",
+    WRITE_COILS: "write coils",
     WRITE_WORDS: "write",
     17: "report id",
     READ_AND_WRITE: "read and write",
@@ -39,11 +40,12 @@ class WordSpan:
     """Adjacent words of a request, either read or written."""
 
     function: int
-    """Function of the address space: 4 for input registers, else 3."""
+    """Function that reads the address space: 1 for coils, 2 for inputs, 4 for input registers,
+    else 3."""
     address: int
     count: int
     written: tuple[int, ...] = ()
-    """Words written; empty for a read."""
+    """Words written, or coils as 0 and 1; empty for a read."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +71,15 @@ def spans_of(request: bytes) -> tuple[WordSpan, ...]:
 
 def _spans(request: bytes) -> Iterator[WordSpan]:
     function, body = request[0], request[1:]
-    if function in (HOLDING, INPUT):
+    if function in SPACES:
         yield WordSpan(function, *struct.unpack_from(">HH", body))
+    elif function == WRITE_COIL:
+        address, word = struct.unpack_from(">HH", body)
+        yield WordSpan(COILS, address, 1, (int(word == COIL_ON),))
+    elif function == WRITE_COILS:
+        address, count, size = struct.unpack_from(">HHB", body)
+        if size == len(body) - 5 == (count + 7) // 8:
+            yield WordSpan(COILS, address, count, bits_of(body[5:], count))
     elif function == WRITE_WORD:
         address, word = struct.unpack_from(">HH", body)
         yield WordSpan(HOLDING, address, 1, (word,))
@@ -85,9 +94,11 @@ def _spans(request: bytes) -> Iterator[WordSpan]:
 
 
 def words_read(exchange: ObservedExchange) -> tuple[int, ...]:
-    """Return the words of a good read reply; empty for any other exchange."""
-    if exchange.answer != "ok" or exchange.function not in (HOLDING, INPUT, READ_AND_WRITE):
+    """Return the words or bits of a good read reply; empty for any other exchange."""
+    if exchange.answer != "ok" or exchange.function not in (*SPACES, READ_AND_WRITE):
         return ()
+    if exchange.function in BIT_READS:
+        return bits_of(exchange.reply[2:], int.from_bytes(exchange.request[3:5], "big"))
     count = exchange.reply[1] // 2
     return struct.unpack_from(f">{count}H", exchange.reply, 2)
 

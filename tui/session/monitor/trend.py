@@ -19,6 +19,7 @@ from tui.bus.written import DeviceWritten
 from tui.drive.foreign_write import WordKind, classify_words
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
+from tui.wire.frames import BIT_READS, at_place
 
 from ..drive_state import DriveState, with_direction
 from ..reading import Reading, with_text
@@ -156,7 +157,7 @@ class Trend:
         codes = [
             code
             for item in settings
-            for code in [part.code for part in item.parameters] or [f"register {item.address}"]
+            for code in [part.code for part in item.parameters] or [_place_text(item.address)]
         ]
         by = written.program.text
         if codes:
@@ -186,6 +187,11 @@ MOST_COMMANDS = 20
 MOST_BY, MOST_CODES = 2, 20
 """Programs and settings that a point names; the newest programs, the first settings."""
 COMMANDED = ("stop", "start", "reset", "reference")
+
+
+def _place_text(place: int) -> str:
+    function, address = at_place(place)
+    return f"coil {address}" if function in BIT_READS else f"register {address}"
 
 
 class TrendWrite(NamedTuple):

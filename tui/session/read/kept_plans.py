@@ -60,7 +60,7 @@ class KeptPlans:
 
 def planned_read(request: ReadRequest) -> PlannedRead:
     """Convert a request for the keeper, which repeats it."""
-    return PlannedRead(request.address, request.count, 4 if request.function == 4 else 3)
+    return PlannedRead(request.address, request.count, request.function)
 
 
 def planned_reads(*plans: ReadPlan) -> tuple[PlannedRead, ...]:

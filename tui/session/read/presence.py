@@ -28,7 +28,7 @@ class PresenceRead:
 
     address: int
     count: int
-    function: Literal[3, 4]
+    function: Literal[1, 2, 3, 4]
 
 
 def presence_read(profile: Profile) -> PresenceRead | None:
@@ -81,11 +81,11 @@ def _neighbors(profile: Profile) -> Parameter | None:
     """Return the first of two adjacent, documented words of the monitoring set; None if none."""
     codes = [value.parameter for value in profile.data.monitoring.values]
     words = {
-        parameter.address: parameter
+        parameter.place: parameter
         for parameter in (profile[code] for code in codes)
         if word_count(parameter) == 1 and is_verified(parameter)
     }
-    pairs = ((word, words.get(word.address + 1)) for word in words.values())
+    pairs = ((word, words.get(word.place + 1)) for word in words.values())
     found = (
         parameter
         for parameter, next_to in pairs

@@ -313,7 +313,7 @@ class Reader:
             parameter = self.profile[place.code]
             words = reply.words[place.offset : place.offset + word_count(parameter)]
             alone = request.count == word_count(parameter) and block is None
-            if alone or unknown not in words:
+            if alone or parameter.is_bits or unknown not in words:
                 found[place.code] = self._reading(parameter, words, reply.time, priority)
         return found
 

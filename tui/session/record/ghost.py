@@ -18,14 +18,14 @@ from tui.simulator.ghost import GhostDrive, RecordedExchange
 
 from .reader import ROWS_AT_A_TIME
 from .replay_reader import ReplayReader
-from .schema import GOOD, REFUSED, SILENT, RecordDamaged, ReplyRow
+from .schema import GOOD, RECORDED_READS, REFUSED, SILENT, RecordDamaged, ReplyRow, read_reply
 
 DAMAGED, WRONG = 3, 4
 WITHOUT_REPLY = (SILENT, DAMAGED, WRONG)
 """Qualities of exchanges that brought no valid reply."""
 ILLEGAL_ADDRESS = 2
 """Exception of a refusal whose own the record does not have."""
-_READS, _WRITE_ONE, _WRITE_MANY = (3, 4), 6, 16
+_WRITE_ONE, _WRITE_MANY = 6, 16
 
 
 class GhostError(DriveError):
@@ -134,7 +134,7 @@ def _request(row: ReplyRow) -> bytes | None:
     if row.address is None:
         return None
     head = bytes([row.function]) + row.address.to_bytes(2, "big")
-    if row.function in _READS:
+    if row.function in RECORDED_READS:
         return head + row.registers.to_bytes(2, "big")
     if row.function == _WRITE_ONE and row.words:
         return head + row.words
@@ -155,4 +155,4 @@ def _reply(row: ReplyRow, request: bytes) -> bytes | None:
         return request[:5]
     if row.words is None:
         return None
-    return bytes([row.function, len(row.words)]) + row.words
+    return read_reply(row.function, row.words)

@@ -258,7 +258,9 @@ def _reduced_point(row: ReducedWords, entry: Parameter, profile: Profile) -> Raw
         # the ends of two registers are not those of a float
         point.quality = NOT_KEPT
         return point
-    if count == 1:
+    if entry.is_bits:
+        point.extent = _bits_extent(entry, [word for word, _ in words])
+    elif count == 1:
         point.extent = words[0][signed]
         if is_field(entry):
             point.extent = _field_extent(entry, words[0][0])
@@ -277,6 +279,16 @@ def _extent(row: ReducedWords, index: int, *, signed: bool) -> Extent:
 def _has(word: tuple[Extent, Extent], unknown: int) -> bool:
     """True if an end of a word's extent is the word for "no value"."""
     return any(end % _WORD == unknown for extent in word for end in (extent.least, extent.most))
+
+
+def _bits_extent(entry: Parameter, bits: Sequence[Extent]) -> Extent | None:
+    """Return the extent of a word of coils; None if one of several changed."""
+    if len(bits) == 1:
+        return bits[0]
+    if any(bit.least != bit.most for bit in bits):
+        return None
+    raw = from_words(entry, [bit.least for bit in bits])
+    return Extent(raw, raw, raw)
 
 
 def _field_extent(entry: Parameter, word: Extent) -> Extent | None:

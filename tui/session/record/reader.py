@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from urllib.parse import quote
 
+from tui.wire.frames import BIT_READS, at_place
+
 from .reduction import Extent, extent_of
 from .schema import (
     GOOD,
@@ -236,11 +238,16 @@ class RecordReader:
                 return
             last = rows[-1][0]
 
-    def last_writer(self, device: int, register: int, since: int, until: int) -> str:
-        """Return the program whose write of a register was the last one that the drive took."""
+    def last_writer(self, device: int, place: int, since: int, until: int) -> str:
+        """Return the program whose write of a register or coil the drive took last.
+
+        `place` is its place, see wire_place().
+        """
+        function, register = at_place(place)
+        writes = (5, 15) if function in BIT_READS else (6, 16)
         found = self._base.execute(
             "SELECT who.name FROM reply JOIN who ON who.id = reply.who WHERE device = ?"
-            " AND utc >= ? AND utc < ? AND function IN (6, 16) AND quality = ? AND address <= ?"
+            f" AND utc >= ? AND utc < ? AND function IN {writes} AND quality = ? AND address <= ?"
             " AND address + registers > ? ORDER BY utc DESC, reply.id DESC LIMIT 1",
             (device, since, until, GOOD, register, register),
         ).fetchone()

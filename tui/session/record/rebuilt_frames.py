@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .schema import QUALITIES, STRAY, ReplyRow
+from .schema import QUALITIES, STRAY, ReplyRow, read_reply
 
 CHECKED_REPLIES = ("good", "exception", "possible copy of the previous reply")
 """Qualities of replies of which the record has function and data."""
@@ -59,5 +59,4 @@ def _reply(row: ReplyRow, request: bytes) -> bytes:
     """The good reply of a function whose words are in a column of their own."""
     if row.function in (SINGLE, MULTIPLE):
         return request[:WRITE_REPLY]
-    words = row.words or b""
-    return bytes([row.function, len(words)]) + words
+    return read_reply(row.function, row.words or b"")

@@ -141,7 +141,8 @@ class ReplayReader(RecordReader):
     def raw_since(self, device: int) -> int:
         """Return since when the reads of a device are recorded one by one; late if they are not."""
         row = self._base.execute(
-            "SELECT utc FROM reply WHERE device = ? AND function IN (3, 4) ORDER BY utc LIMIT 1",
+            "SELECT utc FROM reply WHERE device = ? AND function BETWEEN 1 AND 4"
+            " ORDER BY utc LIMIT 1",
             (device,),
         ).fetchone()
         return int(row[0]) if row else _NEVER
@@ -154,7 +155,8 @@ class ReplayReader(RecordReader):
         )
         form = (
             "SELECT {}, max(utc) FROM {} WHERE device = ? AND utc > ? AND utc <= ?"
-            " AND utc + took <= ? AND function IN (3, 4) {} GROUP BY function, address, registers"
+            " AND utc + took <= ? AND function BETWEEN 1 AND 4 {}"
+            " GROUP BY function, address, registers"
         )
         where = device, begin - LONGEST_EXCHANGE, until, until
         rows = self._base.execute(form.format(_REPLY, "reply", ""), where).fetchall()
@@ -189,7 +191,7 @@ class ReplayReader(RecordReader):
         """Return the last replies of a device in a time, the newest first."""
         form = (
             "SELECT {} FROM {} WHERE device = ? AND utc BETWEEN ? AND ? AND utc + took <= ?"
-            " AND function IN (3, 4) ORDER BY utc DESC LIMIT ?"
+            " AND function BETWEEN 1 AND 4 ORDER BY utc DESC LIMIT ?"
         )
         where = device, since, until, until, most
         rows = self._base.execute(form.format(_REPLY, "reply"), where).fetchall()

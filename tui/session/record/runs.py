@@ -302,7 +302,7 @@ def _described(
     """Return a run with its reference, and the program that began it."""
     who = ""
     if span.begin_within is not None and chart.command:
-        command = profile[chart.command].address
+        command = profile[chart.command].place
         first = span.begun - span.begin_within - COMMANDED_BEFORE
         who = _last_writer(line.files, device, command, first, span.begun + span.begin_within)
     stops = [event.utc / 1e6 for event in line.of("stop", device)]
@@ -356,13 +356,11 @@ def _text(references: History, value: float | None) -> str:
     return f"{number_text(references, value)} {references.unit}".rstrip()
 
 
-def _last_writer(
-    files: Sequence[Path], device: int, register: int, since: float, until: float
-) -> str:
+def _last_writer(files: Sequence[Path], device: int, place: int, since: float, until: float) -> str:
     times = to_microseconds(since), to_microseconds(until) + 1
     for path in reversed(files):
         with suppress(RecordDamaged, OSError, sqlite3.Error), closing(RecordReader(path)) as reader:
-            if who := reader.last_writer(device, register, *times):
+            if who := reader.last_writer(device, place, *times):
                 return who
     return ""
 

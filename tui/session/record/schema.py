@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from tui.bus.ended_exchange import EndedExchange
+from tui.wire.frames import BIT_READS, bits_of, packed_bits
 
 RECORD_VERSION = 1
 """Version of the tables (`PRAGMA user_version`)."""
@@ -29,12 +30,14 @@ QUALITIES = {
 }
 """Names of `quality`, which the file has as a table too."""
 GOOD, REFUSED, SILENT, DAMAGED, WRONG, COPY, STRAY = 0, 1, 2, 3, 4, 5, 8
-RECORDED_READS = (3, 4)
+RECORDED_READS = (1, 2, 3, 4)
 """Functions whose rows are reduced."""
-_READING = (3, 4, 23)
+_READING = (*RECORDED_READS, 23)
+_COILS = (5, 15)
+"""Functions that write coils."""
 _WRITING = {6: 3, 16: 6}
 """Functions that only write, with the place of the words in their requests."""
-_WITH_REGISTERS = (*_READING, *_WRITING)
+_WITH_REGISTERS = (*_READING, *_WRITING, *_COILS)
 _QUALITY_OF = {
     "reply": 0,
     "exception": 1,
@@ -94,10 +97,11 @@ class ReplyRow(NamedTuple):
     function: int
     address: int | None
     registers: int
-    """Registers that were read or written; 0 for functions without registers."""
+    """Registers, coils or inputs that were read or written; 0 for functions without any."""
     quality: int
     words: bytes | None
-    """Registers as on the wire, high byte first: those read, or those written."""
+    """Registers as on the wire, high byte first: those read, or those written. A coil or input that
+    was read is a register of 0 or 1."""
     sent: bytes | None
     """Function and data of a request that the other columns do not give."""
     received: bytes | None
@@ -134,8 +138,12 @@ def reply_row(ended: EndedExchange, who: str) -> ReplyRow:
     received: bytes | None = reply or None
     if function in _WITH_REGISTERS:
         address, registers = _number(request, 1), _number(request, 3)
+    if function == 5:
+        registers = 1
     if function in _READING and good:
         words, received = reply[2:], None
+    if function in BIT_READS and words is not None:
+        words = b"".join(bit.to_bytes(2, "big") for bit in bits_of(words, registers))
     if function in RECORDED_READS:
         sent = None
     if function in _WRITING:
@@ -148,6 +156,12 @@ def reply_row(ended: EndedExchange, who: str) -> ReplyRow:
         to_microseconds(ended.wall) - took, mono, took, ended.device, function, address, registers,
         quality, words, sent, received, ended.repeat, who,
     )  # fmt: skip
+
+
+def read_reply(function: int, words: bytes) -> bytes:
+    """Return the good reply with the words of a row."""
+    data = packed_bits(words[1::2]) if function in BIT_READS else words
+    return bytes([function, len(data)]) + data
 
 
 def stray_row(ended: EndedExchange, data: bytes) -> ReplyRow:

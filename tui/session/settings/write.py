@@ -71,7 +71,7 @@ class Writer:
         try:
             await session.line.write(
                 session.device,
-                parameter.address,
+                parameter.place,
                 to_words(parameter, raw, held),
                 priority=priority,
                 replaceable=replaceable,

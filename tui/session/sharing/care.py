@@ -14,10 +14,11 @@ import msgspec
 from tui.bus.api import ModbusLine
 from tui.bus.line_events import LineEvent, WriteAbandoned
 from tui.bus.link import label
-from tui.bus.requests import ReadWrite, Request, WriteMany, WriteOne
+from tui.bus.requests import Request
 from tui.bus.shared_state import accepts_any_care
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile, unpacked_profile
+from tui.wire.frames import at_place
 
 from ..drive import CareData, DriveSession
 from ..journal import Entry, Journal, now_text
@@ -102,12 +103,12 @@ class DrivesInCare:
         self._journal.add(replace(entry, answer="ok" if error is None else str(error)))
 
     def _entry(self, program: Program, request: Request) -> Entry | None:
-        found = _first_word(request)
-        if found is None:
+        place, words = request.written
+        if not words:
             return None
-        address, words = found
+        function, address = at_place(place)
         session = self.session(request.device)
-        parameter = session.profile.at(address) if session is not None else None
+        parameter = session.profile.at(address, function) if session is not None else None
         return Entry(
             time=now_text(),
             line=label(self._line.link),
@@ -123,16 +124,3 @@ class DrivesInCare:
             read_back=None,
             why=f"sent for {program.text}, which has ended",
         )
-
-
-def _first_word(request: Request) -> tuple[int, tuple[int, ...]] | None:
-    """Return the first address and the words that a request writes; None if it writes none."""
-    match request:
-        case WriteOne(address=address, value=value):
-            return address, (value,)
-        case WriteMany(address=address, values=values):
-            return address, values
-        case ReadWrite(write_address=address, values=values):
-            return address, values
-        case _:
-            return None

@@ -13,6 +13,7 @@ from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.settings.memory_orders import eeprom_copy
 from tui.drive.settings.writable import is_setting
 from tui.drive.values import is_enumeration, is_field, raw_range, word_count
+from tui.drive.words import is_word
 
 from .bench_motion import STOP_SECONDS, need_reset, present_scale, running_chart, start_motor
 from .proof_bench import ProofBench, ProofStep, Unproved, proof_step
@@ -150,7 +151,7 @@ def _setting(profile: Profile, *, copied: bool = False) -> Parameter | None:
             and (not copied or parameter.eeprom_address is not None)
             and parameter.code not in line
             and not (parameter.forbidden or parameter.holds or parameter.resets_others)
-            and not (parameter.factory_by or is_field(parameter) or word_count(parameter) == 2)
+            and not (parameter.factory_by or is_field(parameter) or not is_word(parameter))
             and next(_others(profile, parameter), None) is not None
         ):
             return parameter

@@ -6,7 +6,7 @@ The result of a step is here, too, with the way in which it is carried out.
 from __future__ import annotations
 
 import struct
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from tui.drive.chart import ChartState, read_chart, state_of
@@ -105,6 +105,9 @@ class ProofBench:
     def words(self, address: int, count: int, function: int = 3) -> list[int]:
         """Read registers; raises Unproved."""
         reply = self.ask(struct.pack(">BHH", function, address, count))
+        if function in (1, 2):
+            number = int.from_bytes(reply[2:], "little")
+            return [number >> place & 1 for place in range(count)]
         return list(struct.unpack(f">{count}H", reply[2:]))
 
     def read(self, parameter: Parameter) -> int:
@@ -116,12 +119,24 @@ class ProofBench:
         """Write a raw value; raises Unproved if the drive refuses it."""
         held = self.words(parameter.address, 1)[0] if is_field(parameter) else None
         words = to_words(parameter, raw if raw <= _most(parameter) else raw - 0x10000, held)
+        if parameter.is_bits:
+            self._write_coils(parameter.address, words)
+            return
         if len(words) == 1 and self.profile.function(6) is not None:
             self.ask(struct.pack(">BHH", 6, parameter.address, words[0]))
             return
         data = struct.pack(f">{len(words)}H", *words)
         head = struct.pack(">BHHB", 16, parameter.address, len(words), len(data))
         self.ask(head + data)
+
+    def _write_coils(self, address: int, bits: Sequence[int]) -> None:
+        if len(bits) == 1 and self.profile.function(5) is not None:
+            self.ask(struct.pack(">BHH", 5, address, 0xFF00 if bits[0] else 0))
+            return
+        data = sum(bit << place for place, bit in enumerate(bits)).to_bytes(
+            (len(bits) + 7) // 8, "little"
+        )
+        self.ask(struct.pack(">BHHB", 15, address, len(bits), len(data)) + data)
 
     def raws(self, codes: Iterable[str]) -> dict[str, int]:
         """Read raw values by code; those that cannot be read are missing."""

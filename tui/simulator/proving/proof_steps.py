@@ -292,7 +292,7 @@ def _limits(profile: Profile) -> Iterator[ProofStep]:
 
 def _beyond(profile: Profile, parameter: Parameter) -> Iterator[int]:
     """Yield raw values that the profile excludes, and that its type can hold."""
-    if word_count(parameter) == 2:
+    if word_count(parameter) == 2 or parameter.is_bits:
         return
     low, high = type_range(parameter)
     least, most = raw_range(parameter)
@@ -328,8 +328,8 @@ def _frame(profile: Profile, frame: ProfileFrame) -> None:
     raws = {}
     for parameter in profile.parameters:
         at = parameter.address - contents.address
-        same = parameter.function == contents.function or contents.function not in READING
-        if same and 0 <= at <= len(contents.words) - word_count(parameter):
+        most = len(contents.words) - word_count(parameter)
+        if parameter.function == contents.space and 0 <= at <= most:
             raws[parameter.code] = from_words(parameter, contents.words[at:])
     if contents.function in READING:
         for code, raw in raws.items():

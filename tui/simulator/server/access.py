@@ -3,7 +3,7 @@ ranges."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Function, Multiple, Parameter
@@ -11,10 +11,14 @@ from tui.drive.settings.limits import counts_of
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_enumeration, is_field, raw_range, to_words, word_count
 
-from ..registers import INPUT_REGISTERS, Registers
+from ..registers import Registers
 from ..rules import Traits
 
 NO_VALUE = 0x8000
+OTHER_SPACES: Mapping[int, int] = {4: 0x10000, 1: 0x20000, 2: 0x30000}
+"""First place of input registers, coils and inputs, by the function that reads them."""
+BIT_FUNCTIONS, COIL_WRITES, WRITTEN_SPACES = (1, 2), (5, 15), (3, 1)
+"""Functions that read bits, that write coils, and that read what can be written."""
 
 
 class Refused(Exception):
@@ -67,19 +71,21 @@ class DriveWords:
     def read(self, address: int, count: int, function: Function) -> list[int]:
         """Return the words of a read; raises Refused as the drive would."""
         self._check_count(count, function.max_read, function)
-        block = self._fixed_block(address, count, "read")
+        other = function.code in OTHER_SPACES
+        block = None if other else self._fixed_block(address, count, "read")
         if block is not None:
             return [self._slot_word(block, place) for place in range(count)]
-        if self._reading.single_words_only and count != 1:
+        bits = function.code in BIT_FUNCTIONS
+        if self._reading.single_words_only and count != 1 and not bits:
             raise Refused(self._refusals.wrong_shape)
-        if function.code == 4:
-            words = [self._input_word(a) for a in range(address, address + count)]
+        if other:
+            words = [self._other_word(function.code, a) for a in range(address, address + count)]
         else:
             words = [self._word(a) for a in range(address, address + count)]
         missing = words.count(None)
         if missing == count or (missing and not self._fills_gaps()):
             raise Refused(self._unknown_read())
-        filler = self._reading.unknown_word or 0
+        filler = 0 if bits else self._reading.unknown_word or 0
         return [filler if word is None else word for word in words]
 
     def _fills_gaps(self) -> bool:
@@ -89,9 +95,11 @@ class DriveWords:
         silent = self._refusals.unknown_address is None
         return None if silent else self._reading.unknown_exception
 
-    def _input_word(self, address: int) -> int | None:
-        known = address <= 0xFFFF and self._registers.owner(INPUT_REGISTERS + address)
-        return self._registers.word(INPUT_REGISTERS + address) if known else None
+    def _other_word(self, function: int, address: int) -> int | None:
+        """Return a coil, an input or an input register; None if there is none."""
+        place = OTHER_SPACES[function] + address
+        owner = self._registers.owner(place) if address <= 0xFFFF else None
+        return self._registers.word(place) if owner is not None else None
 
     def _word(self, address: int) -> int | None:
         if address > 0xFFFF:
@@ -135,8 +143,10 @@ class DriveWords:
         written now refuses the rest of it: the words before it have been written.
         """
         self._check_count(len(words), function.max_write, function)
+        coils = function.code in COIL_WRITES
+        address += OTHER_SPACES[1] if coils else 0
         block = self._fixed_block(address, len(words), "write") if len(words) > 1 else None
-        if block is None and self._reading.single_words_only and len(words) != 1:
+        if block is None and self._reading.single_words_only and len(words) != 1 and not coils:
             raise Refused(self._refusals.wrong_shape)
         entries = [
             (address + place, self._write_target(block, address, place), word)
@@ -166,13 +176,13 @@ class DriveWords:
         return self._target(*scanned)
 
     def _check_value(self, address: int, word: int) -> None:
-        parameter = self._registers.owner(address) if address <= 0xFFFF else None
-        if parameter is None:
+        parameter = self._registers.owner(address)
+        if parameter is None or parameter.function not in WRITTEN_SPACES:
             raise Refused(self._refusals.unknown_address)
         if self._unlimited():
             return
         for part in self._parts(parameter):
-            if self._may_be_written(part) and word_count(part) == 1:
+            if self._may_be_written(part) and word_count(part) == 1 and not part.is_bits:
                 self._check_raw(part, from_words(part, [word]))
 
     def _parts(self, parameter: Parameter) -> list[Parameter]:

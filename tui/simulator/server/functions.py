@@ -17,6 +17,7 @@ IDENTIFICATION_TYPE = 14
 COUNTER_RESET, CHECKSUM_COUNT, FRAME_COUNT, ECHO = 10, 12, 14, 0
 NAME_LENGTH = 16
 REFERENCE_OBJECT, SERVER_ID, RUNS = 1, 1, 0xFF
+_OFF, _ON = bytes([0, 0]), bytes([0xFF, 0])
 
 
 class Words(Protocol):
@@ -99,6 +100,35 @@ def _read(server: Server, function: Function, body: bytes) -> bytes:
         raise _wrong_shape(server)
     address, count = struct.unpack(">HH", body)
     return _packed(server.words.read(address, count, function))
+
+
+def _read_bits(server: Server, function: Function, body: bytes) -> bytes:
+    if len(body) != 4:
+        raise _wrong_shape(server)
+    address, count = struct.unpack(">HH", body)
+    bits = server.words.read(address, count, function)
+    data = bytearray((count + 7) // 8)
+    for place, bit in enumerate(bits):
+        data[place // 8] |= bit << place % 8
+    return bytes([len(data)]) + data
+
+
+def _write_coil(server: Server, function: Function, body: bytes) -> bytes:
+    if len(body) != 4 or body[2:] not in (_OFF, _ON):
+        raise _wrong_shape(server)
+    server.words.write(int.from_bytes(body[:2], "big"), [int(body[2:] == _ON)], function)
+    return body
+
+
+def _write_coils(server: Server, function: Function, body: bytes) -> bytes:
+    if len(body) < 5:
+        raise _wrong_shape(server)
+    address, count, size = struct.unpack(">HHB", body[:5])
+    if not count or size != (count + 7) // 8 or len(body) - 5 != size:
+        raise _wrong_shape(server)
+    bits = [body[5 + place // 8] >> place % 8 & 1 for place in range(count)]
+    server.words.write(address, bits, function)
+    return body[:4]
 
 
 def _write_one(server: Server, function: Function, body: bytes) -> bytes:
@@ -190,10 +220,14 @@ def _report_id(server: Server, function: Function, body: bytes) -> bytes:
 
 
 _HANDLERS: Mapping[int, Callable[[Server, Function, bytes], bytes]] = {
+    1: _read_bits,
+    2: _read_bits,
     3: _read,
     4: _read,
+    5: _write_coil,
     6: _write_one,
     8: _diagnose,
+    15: _write_coils,
     16: _write_many,
     17: _report_id,
     23: _read_write,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from ..frames import BIT_READS
 from .splitting import REFUSAL, SAME_BOTH_WAYS, ObservedFrame, fits_reply, fits_request
 
 ObservedAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
@@ -171,8 +172,9 @@ def _answers(requested: ObservedFrame, frame: ObservedFrame) -> bool:
     function = frame.function
     if function in SAME_BOTH_WAYS:
         return frame.pdu[:3] == requested.pdu[:3] and not _repeated(requested, frame)
-    if function in (3, 4, 23):
-        return len(frame.pdu) == 2 + 2 * int.from_bytes(requested.pdu[3:5], "big")
+    if function in (1, 2, 3, 4, 23):
+        words = int.from_bytes(requested.pdu[3:5], "big")
+        return len(frame.pdu) == 2 + ((words + 7) // 8 if function in BIT_READS else 2 * words)
     if (count := _ECHOED.get(function)) is not None:
         return frame.pdu[:count] == requested.pdu[:count]
     return not _repeated(requested, frame)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from tui.drive.words import type_bits
+from tui.drive.words import bit_count, type_bits
 
 from ..schema import Chart, Order, Parameter, ProfileData, When
 from ..toml_lines import TomlPath
@@ -75,12 +75,13 @@ def _waits_fault(chart: Chart, order: Order) -> str:
 def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield states that can never be reached."""
     parameters = {parameter.code: parameter for parameter in data.parameters}
-    wide = {code for code, parameter in parameters.items() if parameter.type.endswith("32")}
     for index, chart in enumerate(data.charts):
         for place, state in enumerate(chart.states):
             at: TomlPath = ("charts", index, "states", place)
-            if state.mask > 0xFFFF and chart.status not in wide:
-                yield at, f"chart {chart.id}: {chart.status} has 16 bits, its mask more."
+            status = parameters.get(chart.status)
+            if status is not None and state.mask & ~type_bits(status):
+                text = f"{chart.status} has {bit_count(status)} bits, its mask more."
+                yield at, f"chart {chart.id}: {text}"
             if state.value & ~state.mask:
                 yield (
                     at,
@@ -117,7 +118,7 @@ def _further_fault(chart: Chart, when: When, parameter: Parameter | None) -> str
     if not when.values or any(value & ~mask for value in when.values):
         return f"a value of {parameter.code} has bits outside its mask, or none is given."
     if mask & ~type_bits(parameter):
-        return f"{parameter.code} has 16 bits, its mask more."
+        return f"{parameter.code} has {bit_count(parameter)} bits, its mask more."
     return ""
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import msgspec
 
 from tui.drive.values import raw_range, type_range, word_count
+from tui.drive.words import bit_count
 
 from ..help_file import help_findings
 from ..schema import HelpData, Parameter, ProfileData
@@ -194,8 +195,7 @@ def _range_faults(
 
 def _shape_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
     long = word_count(parameter) > 1
-    if parameter.type == "ascii" or parameter.words > 1 or parameter.low_byte_first:
-        yield from _text_faults(parameter)
+    yield from _space_faults(parameter)
     if parameter.mask != 0xFFFF or parameter.shift:
         if long or parameter.type != "uint16":
             yield "type", f"a field of a register (mask, shift) is uint16, not {parameter.type}."
@@ -209,16 +209,49 @@ def _shape_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
             "a float32 has a resolution as its scale, such as 0.01, and neither bits, names,"
             " scale_by nor full_scale.",
         )
-    width = 16 * word_count(parameter)
+    width = bit_count(parameter)
     for key, bits in (("bits", [b.bit for b in parameter.bits]), ("reserved", parameter.reserved)):
         if bits and max(bits) >= width:
-            yield key, f"there is no bit {max(bits)} in {parameter.type}: 0 to {width - 1}."
+            what = f"its {width} coils" if parameter.is_bits else parameter.type
+            yield key, f"there is no bit {max(bits)} in {what}: 0 to {width - 1}."
     if parameter.offset != "0" or parameter.scale.startswith("-"):
         yield from _offset_faults(parameter)
-    if parameter.function == 4 and parameter.access != "r":
-        yield "function", "an input register (function 4) can only be read: access must be r."
     if parameter.address + word_count(parameter) > 0x10000:
         yield "address", "exceeds address 65535."
+
+
+_INPUTS = {2: "a discrete input", 4: "an input register"}
+
+
+def _space_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
+    """Yield what does not fit the kind of its registers, coils or inputs."""
+    if parameter.is_bits:
+        yield from _coil_faults(parameter)
+    elif parameter.type == "ascii" or parameter.words > 1 or parameter.low_byte_first:
+        yield from _text_faults(parameter)
+    if (what := _INPUTS.get(parameter.function)) and parameter.access != "r":
+        text = f"{what} (function {parameter.function}) can only be read: access must be r."
+        yield "function", text
+
+
+MOST_COILS = 16
+"""Most coils or inputs that form one word."""
+NOT_OF_COILS = frozenset({
+    "type", "low_byte_first", "mask", "shift", "unit", "scale", "offset", "scale_by", "full_scale",
+    "unit_by", "base", "rating", "min", "max", "min_from", "max_from", "min_of", "max_of",
+    "sure_up_to", "eeprom_address",
+})  # fmt: skip
+"""Fields that coils and discrete inputs cannot have: they are bits, not numbers."""
+
+
+def _coil_faults(parameter: Parameter) -> Iterator[tuple[str, str]]:
+    """Yield what coils and discrete inputs cannot have."""
+    what = "a coil (function 1)" if parameter.function == 1 else "a discrete input (function 2)"
+    for item in msgspec.structs.fields(parameter):
+        if item.name in NOT_OF_COILS and getattr(parameter, item.name) != item.default:
+            yield item.name, f"{what} is 0 or 1 and has no {item.name}."
+    if parameter.words > MOST_COILS:
+        yield "words", f"at most {MOST_COILS} coils form a word, not {parameter.words}."
 
 
 FIELDS_OF_TEXTS = frozenset({

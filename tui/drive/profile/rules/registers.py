@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from tui.drive.words import word_count
+from tui.wire.frames import SPACES
 
 from ..schema import Parameter, ProfileData
 from ..toml_lines import TomlPath
@@ -68,6 +69,8 @@ def eeprom_addresses(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
     """Return why two parameters cannot share an address; empty if they can."""
+    if parameter.is_bits:
+        return f"coil {address} already belongs to {other.code}."
     longer = parameter if word_count(parameter) > 1 else other
     if word_count(longer) > 1 or "ascii" in (parameter.type, other.type):
         return (
@@ -88,18 +91,24 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield parameters whose reading or writing lacks its function."""
     codes = {function.code for function in data.functions}
     read_by = {parameter.function for parameter in data.parameters}
-    if 3 not in codes and (3 in read_by or 4 not in codes):
+    if 3 not in codes and (3 in read_by or not codes & set(SPACES)):
         yield ("functions",), "function 3 is missing, so nothing can be read."
     writes = codes & {6, 16}
+    most_coils = next((f.max_write or 1 for f in data.functions if f.code == 15), 0)
     pairs = any(f.code == 16 and (f.max_write or 1) > 1 for f in data.functions)
     for index, parameter in enumerate(data.parameters):
         place = ("parameters", index)
-        if parameter.function == 4 and 4 not in codes:
+        if parameter.function != 3 and parameter.function not in codes:
             yield (
                 (*place, "function"),
-                f"parameter {parameter.code}: function 4 is not among the functions. Add it.",
+                f"parameter {parameter.code}: function {parameter.function} is not among the"
+                " functions. Add it.",
             )
         if parameter.access == "r" or parameter.forbidden:
+            continue
+        if parameter.is_bits:
+            if not (parameter.words <= most_coils or (parameter.words == 1 and 5 in codes)):
+                yield (*place, "access"), _coils_unwritten(parameter)
             continue
         if parameter.type.endswith("32") and 16 not in codes:
             yield (
@@ -119,6 +128,20 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 f"parameter {parameter.code}: it can be written only by function 6 or 16, and"
                 " neither is among the functions. Add one, or set access r.",
             )
+
+
+_COIL_UNWRITTEN = (
+    "parameter {code}: a coil is written by function 5 or 15. Add the function, or set access r."
+)
+_COILS_UNWRITTEN = (
+    "parameter {code}: {count} coils are written at once, by function 15 with a max_write of at"
+    " least that. Add it, or set access r."
+)
+
+
+def _coils_unwritten(parameter: Parameter) -> str:
+    text = _COIL_UNWRITTEN if parameter.words == 1 else _COILS_UNWRITTEN
+    return text.format(code=parameter.code, count=parameter.words)
 
 
 def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
@@ -142,7 +165,8 @@ def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def sizes(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Yield blocks and functions that are larger than a request."""
+    """Yield blocks and functions that are larger than a request, and blocks of coils."""
+    bits = {parameter.code for parameter in data.parameters if parameter.is_bits}
     for index, function in enumerate(data.functions):
         if function.code == 23 and (function.max_write or 0) > MOST_WRITTEN_BY_23:
             yield (
@@ -156,6 +180,9 @@ def sizes(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 (*at, "max_words"),
                 f"block {block.id}: a request writes at most {MOST_WRITTEN} words, not {most}.",
             )
+        choices = [choice.parameter for choice in block.choices]
+        for code in {*block.slots, *block.values, *choices} & bits:
+            yield at, f"block {block.id}: {code} is on coils or inputs. A block holds registers."
         if block.min_words > most:
             yield (
                 (*at, "min_words"),

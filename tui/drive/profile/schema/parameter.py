@@ -6,6 +6,8 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
+from tui.wire.frames import BIT_READS, wire_place
+
 from .base import (
     BitNumber,
     Confidence,
@@ -21,6 +23,7 @@ from .base import (
 
 WordType = Literal["uint16", "int16", "uint32", "int32", "float32", "ascii"]
 Access = Literal["r", "rw", "rw-stopped", "w"]
+ReadFunction = Literal[1, 2, 3, 4]
 Storage = Literal["ram", "eeprom", "ram-until-saved", "unknown"]
 
 
@@ -220,11 +223,13 @@ class Parameter(Table, frozen=True, kw_only=True):
     address: WordAddress
     eeprom_address: WordAddress | None = None
     """Address of its copy in EEPROM; `address` is then the one in RAM. Both hold whole words."""
-    function: Literal[3, 4] = 3
-    """The function that reads it: 3, or 4 for an input register, which is never written."""
+    function: ReadFunction = 3
+    """The function that reads it: 3; 4 for an input register, 1 for coils, 2 for discrete inputs.
+    Inputs are never written."""
     type: WordType = "uint16"
     words: Annotated[int, Meta(ge=1, le=32)] = 1
-    """Registers of a text (`ascii`), two characters each; a text is only read."""
+    """Registers of a text (`ascii`), two characters each; a text is only read. Of coils or
+    discrete inputs, how many form the word: the first one is bit 0."""
     low_byte_first: bool = False
     """True if the first character of each register of a text is its low byte."""
     low_word_first: bool = True
@@ -290,6 +295,21 @@ class Parameter(Table, frozen=True, kw_only=True):
     note: str = ""
     source: str
     confidence: Confidence
+
+    @property
+    def is_register(self) -> bool:
+        """True if it is in holding registers, which function 3 reads."""
+        return self.function == 3
+
+    @property
+    def is_bits(self) -> bool:
+        """True if it consists of coils or discrete inputs."""
+        return self.function in BIT_READS
+
+    @property
+    def place(self) -> int:
+        """Its address as one number in all address spaces; that of a register is unchanged."""
+        return wire_place(self.function, self.address)
 
     @property
     def scale_source(self) -> str:
