@@ -131,13 +131,17 @@ def parsed(source: SourceText) -> dict[str, Any]:
 
 
 def _shared_file(own: SourceText, path: Path, packaged: Path, name: object) -> Path:
-    place = f"{own.file}:{own.lines.get(('profile', 'rows_from'), 1)}"
-    if not isinstance(name, str) or PurePosixPath(name).is_absolute() or ".." in Path(name).parts:
-        raise ProfileError(f"{place}: rows_from: {name!r} is not a file name in this folder.")
-    for folder in (path.parent, packaged):
-        if (found := folder / name).is_file():
-            return found
-    raise ProfileError(f"{place}: rows_from: there is no file {name!r} in the folder.")
+    why = f"{name!r} is not a file name in this folder."
+    if isinstance(name, str) and not (
+        PurePosixPath(name).is_absolute() or ".." in Path(name).parts
+    ):
+        for folder in (path.parent, packaged):
+            if (found := folder / name).is_file():
+                return found
+        why = f"there is no file {name!r} in the folder."
+    # found only now: it reads the whole text again
+    line = own.lines.get(("profile", "rows_from"), 1)
+    raise ProfileError(f"{own.file}:{line}: rows_from: {why}")
 
 
 def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
