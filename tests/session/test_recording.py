@@ -11,6 +11,7 @@ import pytest
 from tests.programs import wait_until
 from tui.session.record.reader import RecordReader
 from tui.session.record.record_file import RecordFile
+from tui.session.recording import recording_file
 from tui.session.recording.recording_file import RecordingFile
 from tui.session.recording.triggers import (
     CycleSeen,
@@ -109,6 +110,22 @@ def test_rows_that_the_disk_refuses_are_written_later(
     with closing(RecordReader(file.path)) as reader:
         assert [item.word for item in reader.words(1, REGISTER, *EVER)] == [1, 2]
         assert sum(item.good for item in reader.reduced(1, REGISTER, *EVER)) == 2
+
+
+def test_recording_is_flushed_in_time_for_a_power_cut(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recording_file, "FLUSHED_EVERY", 0.0)
+    file = RecordingFile(tmp_path / "values.sqlite", "serial:x", "record")
+    for word in (1, 2):
+        file.add([row_of(word, mono=word)])
+        file.write()
+        wait_until(lambda word=word: file.written == word, "the row is written")  # type: ignore[misc]
+    cut = tmp_path / "cut.sqlite"
+    cut.write_bytes(file.path.read_bytes())  # without the log, as it is not flushed
+    with closing(RecordReader(cut)) as reader:
+        assert [item.word for item in reader.words(1, REGISTER, *EVER)] == [1]
+    file.close()
 
 
 def test_clock_that_jumps_is_recorded_and_reported(tmp_path: Path) -> None:

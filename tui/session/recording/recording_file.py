@@ -16,6 +16,7 @@ from tui.drive.values import to_words, word_count
 
 from ..reading import Reading
 from ..record.clock_jumps import ClockJumps
+from ..record.recorder import FLUSHED_EVERY
 from ..record.schema import GOOD, REFUSED, SILENT, EventRow, ReplyRow, to_microseconds
 from ..shown import Quality
 
@@ -122,6 +123,7 @@ class RecordingFile:
         self._create = partial(_created, path, line, program)
         self._jumps = ClockJumps(report)
         self._waiting: list[RecordingRow] = []
+        self._flushed = time.monotonic()
         self._thread = ThreadPoolExecutor(1, thread_name_prefix="recording")
         self._writing: Future[list[RecordingRow]] | None = None
         try:
@@ -152,6 +154,9 @@ class RecordingFile:
         try:
             if self._file is None:
                 self._file = self._create()
+            if (now := time.monotonic()) - self._flushed > FLUSHED_EVERY:
+                self._flushed = now
+                self._file.flush()
             self._file.write(values, [row for row in rows if isinstance(row, EventRow)])
         except OSError as error:
             self.trouble = error.strerror or str(error)
