@@ -343,3 +343,29 @@ def test_gaps_never_include_a_value() -> None:
             inside = [gap for gap in gaps if gap[0] < point.time < gap[1]]
             edge = [gap for gap in gaps if gap[0] <= point.time <= gap[1]]
             assert not inside if point.mean is not None else edge
+
+
+def block_event(at: float, places: dict[int, str]) -> EventRow:
+    about = json.dumps({"places": places, "since": at})
+    return EventRow(WALL + round(at * SECOND), MONO, 1, "block", about)
+
+
+@pytest.mark.parametrize("reduced", [False, True])
+def test_words_of_a_block_are_values_of_the_parameters_that_were_in_it(
+    tmp_path: Path, *, reduced: bool
+) -> None:
+    """Near a change they are of neither parameter: the drive may have changed earlier."""
+    register = ATV71.data.blocks[0].address
+    rows = [row_of(Sent(at, (at,)), register) for at in range(100)]
+    events = [block_event(10, {register: "LCR"}), block_event(40.5, {register: "RFR"})]
+    events += [block_event(70.5, {register: "RFR", register + 1: "LCR"})]
+    file = written(tmp_path, rows, [profile_event(ATV71), *events])
+    if reduced:
+        expire(file, 200)
+    file.close()
+    for code, first, last in (("LCR", 10, 35), ("RFR", 41, 99)):
+        found = points(tmp_path, code)
+        assert all(point.reduced is reduced for point in found)
+        ends = [10 * value for point in found for value in (point.least, point.most) if value]
+        assert first <= min(ends) <= first + 10 * reduced
+        assert last - 10 * reduced <= max(ends) <= last

@@ -24,7 +24,7 @@ from tui.bus.model import IdentificationObjects, LineState, LineStatus, Priority
 from tui.bus.notes import LineNote
 from tui.bus.requests import Objects, Request
 from tui.bus.tally import Tally
-from tui.session.event_notes import EVENTS_OF_LINE, PROFILE_OF_DRIVE, LeftEvent
+from tui.session.event_notes import BLOCK_OF_DRIVE, EVENTS_OF_LINE, PROFILE_OF_DRIVE, LeftEvent
 from tui.session.record.ghost import GhostRecord
 from tui.session.record.record_file import RecordFile
 from tui.session.record.replay_clock import ReplayClock
@@ -69,8 +69,8 @@ class VirtualLine(FakeLine):
         self.facts.notes.heard = self._hear_note
 
     def _hear_note(self, note: LineNote) -> None:
-        if note.kind == PROFILE_OF_DRIVE:
-            self._note("profile", note.data.decode(), note.device)
+        if note.kind in (PROFILE_OF_DRIVE, BLOCK_OF_DRIVE):
+            self._note(note.kind, note.data.decode(), note.device)
         elif note.kind == EVENTS_OF_LINE:
             left = msgspec.msgpack.decode(note.data, type=LeftEvent)
             _, device, kind, text = left.event

@@ -209,6 +209,17 @@ def _checks(
     ]
 
 
+def block_places(profile: Profile, slots: Mapping[str, int]) -> dict[int, str]:
+    """Return the code in each register of a block or scanner, by the raw values of its slots."""
+    return {
+        block.address + offset: code
+        for block in profile.data.blocks
+        if block.direction == "read"
+        for offset, slot in enumerate(block.slots)
+        if (code := _assigned(profile, block, slots.get(slot))) is not None
+    }
+
+
 def _assigned(profile: Profile, block: Block, raw: int | None) -> str | None:
     """Return the code that a slot's raw value selects; None if it is unused or unknown."""
     if raw is None:

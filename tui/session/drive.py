@@ -109,6 +109,8 @@ class DriveSession:
         """Records of its motor's starts; None if they are not kept."""
         self.rest_seen = -math.inf
         """When it was last read in a state other than running or stopping (session's clock)."""
+        self.reads_blocks = True
+        """False in a replay: the line knows which parameters the recorded words of a block are."""
         self.full_reads_requested = 0
         """Number of requests to re-read every value."""
         line.describe(device, limits_of(profile))

@@ -14,6 +14,8 @@ from .events import Event, EventLog
 EVENTS_OF_LINE = "events"
 PROFILE_OF_DRIVE = "profile"
 """Kind of the note, in JSON, that names the profile by which a program reads a drive."""
+BLOCK_OF_DRIVE = "block"
+"""Kind of the note, in JSON, that names the parameters in an indirect block or scanner."""
 MOST_CHARACTERS = MOST_NOTE // 8
 SAME_WITHIN = 2.0
 """Seconds in which equal messages of several programs are about the same event."""

@@ -23,7 +23,7 @@ from tui.bus.link import label
 from tui.bus.program import Program
 from tui.bus.share.place import file_name_of
 
-from ..event_notes import EVENTS_OF_LINE, PROFILE_OF_DRIVE, LeftEvent
+from ..event_notes import BLOCK_OF_DRIVE, EVENTS_OF_LINE, PROFILE_OF_DRIVE, LeftEvent
 from ..record.recorder import LineRecorder
 from ..record.ring import files_of_line, record_folder
 from ..record.schema import EventRow, to_microseconds
@@ -162,8 +162,8 @@ class RecordedEvents:
                 self._event("commander", text, device, self._name_of(new or old or ""))
 
     def _hear_note(self, note: LineNote) -> None:
-        if note.kind == PROFILE_OF_DRIVE:
-            self._event("profile", note.data.decode("utf-8", "replace"), note.device)
+        if note.kind in (PROFILE_OF_DRIVE, BLOCK_OF_DRIVE):
+            self._event(note.kind, note.data.decode("utf-8", "replace"), note.device)
         elif note.kind == EVENTS_OF_LINE:
             left = msgspec.msgpack.decode(note.data, type=LeftEvent)
             wall, device, kind, text = left.event

@@ -26,6 +26,7 @@ from ..read.reader import Reader
 from ..read.rotation import Rotation
 from ..reading import Reading
 from ..shown import Quality
+from .block_notes import BlockNotes
 from .rates import SLOW_FACTOR, Rates, bad_readings, rates_of
 from .snapshot import Snapshot, stale_after
 from .steady_cycles import SteadyCycles, SteadyPlan
@@ -50,7 +51,6 @@ RESTART_AFTER = 1.0
 """Seconds after which a monitor that failed by an internal error restarts."""
 RATE_OVER = 6
 """Cycles over which the rate is measured."""
-
 
 Listener = Callable[[Snapshot], None]
 
@@ -88,6 +88,7 @@ class Monitor:
         """Kind of the last state read."""
         self.was = ""
         """Headline of the last known state; empty before the first."""
+        self._block_notes = BlockNotes(session, self.reader)
         self._all_due = True
         self._full_reads_done = 0
         self._learn_due = True
@@ -288,6 +289,7 @@ class Monitor:
                 self._publish(cycle, readings, rates, _span(begun, period), error, contact)
                 if not error:
                     await self._learn(cycle)
+                    self._block_notes.note(used=bool(self._using))
                     if await self._goes_on(rates, due, started + period):
                         continue
                 self._steady.end()

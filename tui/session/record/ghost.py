@@ -90,7 +90,7 @@ def read_recorded(text: str) -> GhostRecord:
     try:
         with closing(GhostReader(path)) as reader:
             rows = list(reader.exchanges(device))
-            named = reader.profiles(device)
+            named = reader.notes_of(device, "profile")
             known = reader.devices()
     except (sqlite3.Error, RecordDamaged) as error:
         raise GhostError(f"{name} cannot be read: {error}.") from None

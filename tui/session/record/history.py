@@ -17,6 +17,8 @@ from operator import attrgetter
 from pathlib import Path
 from typing import TypeVar
 
+from msgspec import structs
+
 from tui.drive.errors import ProfileError, UnknownProfile
 from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile, digest_of
@@ -24,6 +26,7 @@ from tui.drive.profile.schema import Parameter
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_field, is_signed_type, word_count
 
+from .block_times import BlockTimes
 from .decoding import (
     NO_GOOD_REPLY,
     NOT_KEPT,
@@ -65,6 +68,7 @@ class _Reading:
     device: int
     own: Profile | None
     troubles: dict[str, None] = field(default_factory=dict)
+    blocks: BlockTimes = field(default_factory=lambda: BlockTimes(()))
 
     def note(self, text: str) -> None:
         self.troubles.setdefault(text)
@@ -104,6 +108,8 @@ def read_history(
     """
     work = _Reading(files, device, own)
     periods = _profiles(work, since, until)
+    before = since - SOURCES_BEFORE
+    work.blocks = BlockTimes(work.rows(before, until, lambda it: it.notes_of(device, "block")))
     profiles = {id(profile): profile for _, profile in periods if profile is not None}
     points: list[HistoryPoint] = []
     last: tuple[Parameter, str] | None = None
@@ -135,7 +141,9 @@ def _profiles(work: _Reading, since: float, until: float) -> Periods:
     found: dict[int, Profile | None] = {}
     known: dict[str, Profile | None] = {}
     before = since - SOURCES_BEFORE
-    for utc, text in work.rows(before, until, lambda reader: reader.profiles(work.device)):
+    for utc, text in work.rows(
+        before, until, lambda reader: reader.notes_of(work.device, "profile")
+    ):
         if text not in known:
             known[text] = _profile_of(work, text)
         found[utc] = known[text]
@@ -190,10 +198,21 @@ def _raw_points(
     """Return the points of a parameter: each reply once, as it was or reduced."""
     times = round(since * 1e6), round(until * 1e6)
 
-    def read(reader: RecordReader) -> Iterable[RawPoint]:
+    def read(
+        reader: RecordReader, entry: Parameter = entry, times: tuple[int, int] = times
+    ) -> Iterable[RawPoint]:
         return _points_of_file(reader, work.device, profile, entry, times)
 
-    return work.rows(since - REDUCED_OVER / 1e6, until, read)
+    begin = since - REDUCED_OVER / 1e6
+    found = work.rows(begin, until, read)
+    for register, first, last in work.blocks.of(entry.code):
+        # a reduced row may begin before the parameter was in the block, or end after
+        span = max(first, times[0]), min(last, times[1])
+        if span[0] < span[1]:
+            moved = structs.replace(entry, address=register, function=3)
+            points = work.rows(begin, until, partial(read, entry=moved, times=span))
+            found += [point for point in points if first <= point.time and point.end <= last]
+    return found
 
 
 def _points_of_file(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sqlite3
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Literal, NamedTuple
 from urllib.parse import quote
 
 from tui.wire.frames import BIT_READS, at_place
@@ -196,11 +196,11 @@ class RecordReader:
         ]
         return min((utc for utc in times if utc is not None), default=None)
 
-    def profiles(self, device: int) -> list[tuple[int, str]]:
-        """Return the events that name the profile of a drive, with their `utc`."""
+    def notes_of(self, device: int, kind: Literal["profile", "block"]) -> list[tuple[int, str]]:
+        """Return the events that name the profile of a drive, or its block, with their `utc`."""
         rows = self._base.execute(
-            "SELECT utc, text FROM event WHERE kind = 'profile' AND device = ? ORDER BY utc, id",
-            (device,),
+            "SELECT utc, text FROM event WHERE kind = ? AND device = ? ORDER BY utc, id",
+            (kind, device),
         )
         return list(rows)
 

@@ -58,7 +58,7 @@ SETTLED_AFTER = 20.0
 """Seconds without a failure after which that is reported: a full disk has room for a moment."""
 RECORD_ENDS_WITHIN = 2.0
 """Seconds for which the end of the program waits for the disk."""
-STANDING_EVENTS = ("profile", "line settings")
+STANDING_EVENTS = ("profile", "block", "line settings")
 """Kinds of events that say how to read the rows that follow: each file has the last of them."""
 
 if TYPE_CHECKING:
