@@ -6,8 +6,9 @@ import asyncio
 import json
 import sqlite3
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -22,12 +23,21 @@ from tui.bus.errors import (
     RequestRefused,
 )
 from tui.bus.link import SerialLink
+from tui.drive.profile.library import load
+from tui.session.connect.identify import DriveIdentity
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
 from tui.session.fleet import Fleet
+from tui.session.record.history import read_history
 from tui.session.record.record_file import RecordFile
 from tui.session.record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from tui.session.record.replay_text import open_replay, parse_replay, time_in
 from tui.session.record.schema import EventRow, ReplyRow
-from tui.session.replay import UnwrittenJournal, pass_lead, take_drives
+from tui.session.replay import UnwrittenJournal, open_past, pass_lead, take_drives
+from tui.session.shown import Quality
+from tui.simulator import DriveSpec
+
+from .virtual_line import VirtualLine
 
 BEGIN = 1_795_000_000
 LINE = "serial:/dev/ttyUSB0,9600,8N1"
@@ -132,7 +142,7 @@ def test_silent_drive_answers_no_request_but_its_last_values_are_known(tmp_path:
         asyncio.run(line.run_to(BEGIN + 3.5))
         with pytest.raises(NoAnswer):
             words(line)
-        assert line.last_reply(1, 3, 200, 1).words == (20,)
+        assert [item and item.words for item in line.last_replies(1, [(3, 200, 1)])] == [(20,)]
         assert line.counters.devices[1].timeouts == 1
 
 
@@ -179,14 +189,14 @@ def test_reduced_reply_has_a_mean_for_quantities_only(tmp_path: Path) -> None:
         assert words(line, 101) == (7,)
         with pytest.raises(NotRecorded):
             words(line, 100)
-        line.use_means(1, {(3, 100): False}.get)
+        line.use_profile(1, {(3, 100): False}.get, lambda code: None)
         assert words(line, 100)[0] in range(100, 110)
 
 
 def test_reduced_reply_does_not_replace_the_replies_it_is_made_of(tmp_path: Path) -> None:
     rows = [row(index, (100 + index,)) for index in range(10)]
     with replayed(record(tmp_path, *rows), 9.5) as line:
-        line.use_means(1, {(3, 100): False}.get)
+        line.use_profile(1, {(3, 100): False}.get, lambda code: None)
         assert words(line) == (109,)
         assert line.device_state(1).heard == pytest.approx(BEGIN + 9)
 
@@ -346,22 +356,112 @@ def test_record_that_is_opened_again_shows_what_a_first_opening_shows(
                 words(line, 300)
 
 
-def test_curve_of_the_open_drive_has_each_recorded_cycle(tmp_path: Path) -> None:
-    """A sample each 10 s would miss the peak of a second."""
-    peak = 250
-    cycles = [
-        row(at, (0x0637, 300, 300, 200 if at == peak else 84), address=3201) for at in range(1, 450)
-    ]
-    text = json.dumps({"profile": "atv71"})
-    path = record(tmp_path, *cycles, events=(event(0.5, "profile", text, 1),))
-    line = ReplayLine(path, BEGIN + 400, lead=60.0)
+PEAK = 250
+
+
+@contextmanager
+def replayed_drive(
+    path: Path, at: float, device: int | None
+) -> Iterator[tuple[ReplayLine, DriveConsole]]:
+    """Drive 1 of a record at a time; `device` is the open one."""
+    line = ReplayLine(path, BEGIN + at, lead=60.0)
     line.open()
     with closing(line):
         fleet = Fleet(line, UnwrittenJournal(), None, None, line.clock)
         take_drives(line, fleet)
-        asyncio.run(pass_lead(line, fleet, 1, lambda console: None, 1.0))
-        points = fleet.consoles[0].monitor.trend
+        asyncio.run(pass_lead(line, fleet, device, lambda console: None, 1.0))
+        yield line, fleet.consoles[0]
         fleet.forget()
-    current = {round(point.time - BEGIN): point.values[1] for point in points}
-    assert set(range(1, 340)) <= set(current)
-    assert [at for at, value in current.items() if value == 20.0] == [peak]
+
+
+def cycles(folder: Path, times: Iterable[float]) -> Path:
+    """A record with cycles of drive 1 at these times; one has a peak of the current."""
+    rows = [row(at, (0x0637, 300, 300, 200 if at == PEAK else 84), address=3201) for at in times]
+    text = json.dumps({"profile": "atv71"})
+    return record(folder, *rows, events=(event(0.5, "profile", text, 1),))
+
+
+def currents(console: DriveConsole) -> dict[float, float | None]:
+    """The current of a curve, by the time since the begin."""
+    return {round(point.time - BEGIN, 2): point.values[1] for point in console.monitor.trend}
+
+
+def test_curve_of_the_open_drive_has_each_recorded_cycle(tmp_path: Path) -> None:
+    """A sample each 10 s would miss the peak of a second."""
+    with replayed_drive(cycles(tmp_path, range(1, 450)), 400, 1) as (_, console):
+        found = currents(console)
+    assert set(range(1, 340)) <= set(found)
+    assert [at for at, value in found.items() if value == 20.0] == [PEAK]
+
+
+def test_curve_of_a_drive_opened_later_has_each_recorded_cycle(tmp_path: Path) -> None:
+    with replayed_drive(cycles(tmp_path, range(1, 450)), 400, None) as (line, console):
+        assert PEAK - 1 not in currents(console)
+        open_past(line, console)
+        end = time.monotonic() + 5
+        while PEAK - 1 not in currents(console) and time.monotonic() < end:
+            time.sleep(0.01)
+        found = currents(console)
+    assert [at for at in found if at < 399.5] == [*range(1, 400)]
+    assert [at for at, value in found.items() if value == 20.0] == [PEAK]
+
+
+def test_curve_on_line_has_the_recorded_checks_and_no_others(tmp_path: Path) -> None:
+    """Those of the last minute, and those that follow while the replay goes on."""
+    checks = [round(3.07 * number, 2) for number in range(1, 140)]
+    with replayed_drive(cycles(tmp_path, checks), 400, None) as (line, console):
+        for later in (0, 20):
+            asyncio.run(line.run_to(BEGIN + 400 + later))
+            found = [at for at in currents(console) if at > 340]
+            assert found == [at for at in checks if 340 < at <= 400 + later]
+
+
+def test_words_of_a_block_are_known_as_those_of_its_parameters(tmp_path: Path) -> None:
+    """From the note of a program on; shortly before another note they are unsure."""
+    notes = [(3, {50: "A", 51: "B"}), (20.5, {51: "B"})]
+    texts = [(at, json.dumps({"places": places})) for at, places in notes]
+    rows = [
+        row(1, (7,), address=200),
+        *(row(at, (at, 100 + at), address=50) for at in range(2, 30)),
+    ]
+    path = record(tmp_path, *rows, events=tuple(event(at, "block", text, 1) for at, text in texts))
+    for at, expected in ((2.5, 7), (4.5, 4), (14.5, 14), (19.5, 7), (29.5, 7)):
+        line = ReplayLine(path, BEGIN + at)
+        with closing(line):
+            line.use_profile(1, lambda place: None, {"A": (3, 200)}.get)
+            (reply,) = line.last_replies(1, [(3, 200, 1)])
+            assert reply is not None
+            assert reply.words == (expected,)
+
+
+@pytest.mark.sweep
+async def test_values_that_came_by_a_block_are_shown_as_live(tmp_path: Path) -> None:
+    """Drive 1 has five values of Monitor in its block, which takes their place after 30 s."""
+    slots = dict(zip(("F875", "F876", "F877", "F878", "F879"), (2, 3, 11, 1, 4), strict=True))
+    path = tmp_path / "run.sqlite"
+    live = VirtualLine(path, DriveSpec("atv21", 1, run_hz=30.0, wander=True, sets=slots))
+    profile, identity = load("atv21"), DriveIdentity(1, "", "", "", "", "atv21", ("atv21",))
+    console = Fleet(live, UnwrittenJournal(), None, None, live.time).take(
+        DriveSession(live, 1, profile, identity, live.time)
+    )
+    console.monitor.start(period=0.5)
+    for _ in range(50):
+        await live.pass_time(1.0)
+    assert console.latest is not None
+    assert console.latest.block == "Read block"
+    live.end_record()
+    line = ReplayLine(path, BEGIN + 48, lead=60.0)
+    line.open()
+    with closing(line):
+        fleet = Fleet(line, UnwrittenJournal(), None, None, line.clock)
+        take_drives(line, fleet)
+        await pass_lead(line, fleet, 1, lambda console: console.monitor.start(period=0.5), 0.5)
+        found = fleet.consoles[0].latest
+        fleet.forget()
+    assert found is not None
+    assert found.state.kind == console.latest.state.kind == "running"
+    assert {item.quality for item in found.readings.values()} == {Quality.GOOD}
+    history = read_history([path], 1, "FD00", BEGIN, BEGIN + 60)
+    apart = [b.time - a.time for a, b in pairwise(history.points)]
+    assert max(apart) < 1
+    assert history.points[-1].time > BEGIN + 49

@@ -6,7 +6,7 @@ import asyncio
 import json
 from collections.abc import Callable
 from contextlib import suppress
-from functools import lru_cache
+from functools import lru_cache, partial
 from operator import attrgetter
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +16,7 @@ from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.bus.model import LineStatus
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
-from tui.drive.profile.profile import digest_of
+from tui.drive.profile.profile import Profile, digest_of
 from tui.drive.values import from_words, word_count
 
 from .connect.identify import DriveIdentity, identity_from
@@ -26,12 +26,20 @@ from .fleet import Fleet
 from .journal import Entry, Journal
 from .monitor.fault_record import SECONDS_KEPT
 from .monitor.line_watch import GLANCE
+from .monitor.trend import Trend
 from .reading import Origin, Reading
 from .record.newest import ends_of_cycles
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from .record.runs import history_of, read_events
 from .record.schema import EventRow, to_microseconds
-from .replay_past import PAST_SECONDS, means_of, past_times, recall_past
+from .replay_past import (
+    PAST_SECONDS,
+    RECENT_SECONDS,
+    RecordedCycles,
+    means_of,
+    recall_past,
+    recorded_curve,
+)
 
 TRIPS_OF = 4
 """Drives whose trips are events of a replay, if none is open."""
@@ -46,10 +54,6 @@ STEP_MARGIN = 0.03
 """Seconds from the end of a recorded cycle to that of the replay: the recorded ones vary."""
 MOST_SOUGHT = 500
 """Replies in which they are sought."""
-MOST_OF_CURVE = 100_000
-"""Replies of a curve at most."""
-AFTER_REPLY = 0.001
-"""Seconds after a reply at which its values are known, whatever the rounding of times."""
 SOUGHT_PAUSES = 5
 """Periods before the time of a replay in which its cycles are sought."""
 LONGER_THAN_LEAD = 1000.0
@@ -110,14 +114,21 @@ def take_drives(line: ReplayLine, fleet: Fleet) -> list[str]:
             fleet.note(identity)
             reported.append(NO_PROFILE.format(device=device, error=error))
             continue
-        line.use_means(device, means_of(profile).get)
+        line.use_profile(device, means_of(profile).get, partial(_place_of, profile))
         session = DriveSession(line, device, profile, identity, line.clock)
         session.arming.barred = REPLAY_SENDS_NOTHING
+        session.reads_blocks = False
         # reads cost nothing here: a slow value is shown as soon as it was read then
         fleet.take(session).monitor.slow_factor = 1
         if named.hash and named.hash != digest_of(profile):
             reported.append(OTHER_PROFILE.format(device=device, profile=id))
     return reported
+
+
+def _place_of(profile: Profile, code: str) -> tuple[int, int] | None:
+    """Return function and address of a parameter; None if the profile lacks it."""
+    entry = profile.get(code)
+    return None if entry is None else (entry.function, entry.address)
 
 
 def _identity(line: ReplayLine, device: int, named: NamedProfile) -> DriveIdentity:
@@ -164,11 +175,12 @@ def _trips_of(files: tuple[Path, ...], device: int, profile: str) -> list[EventR
 
 def _take_known(line: ReplayLine, session: DriveSession) -> None:
     """Have a session know all that was read of its drive by now, by any program."""
+    parameters = session.profile.data.parameters
+    places = [(item.function, item.address, word_count(item)) for item in parameters]
     found = {}
-    for parameter in session.profile.data.parameters:
-        place = parameter.function, parameter.address, word_count(parameter)
-        with suppress(LineError):
-            reply = line.last_reply(session.device, *place)
+    replies = line.last_replies(session.device, places)
+    for parameter, reply in zip(parameters, replies, strict=True):
+        if reply is not None:
             raw = from_words(parameter, reply.words)
             found[parameter.code] = Reading.undecoded(parameter, raw, reply.time, Origin.POLL)
     session.take(found)
@@ -193,14 +205,6 @@ def in_step(line: ReplayLine, device: int | None, since: float, period: float) -
     return since + (ends[-1] + STEP_MARGIN - since) % period
 
 
-def _recorded_cycles(line: ReplayLine, device: int, until: float) -> list[float]:
-    """Return the times just after the recorded cycles of a drive's curve, up to a time."""
-    replies = line.last_before(device, line.at - PAST_SECONDS, until, MOST_OF_CURVE)
-    ends = [end + AFTER_REPLY for end in ends_of_cycles(replies[::-1], until)]
-    # the pause after the last one is not over by then
-    return [*ends, replies[0].ended / 1e6 + AFTER_REPLY] if replies else ends
-
-
 async def pass_lead(
     line: ReplayLine,
     fleet: Fleet,
@@ -212,8 +216,8 @@ async def pass_lead(
 ) -> None:
     """Go to the time of the replay: with the seconds before it of the drive `device`.
 
-    `monitor` starts its monitor, which `goes_on` then. Of the other drives, samples of the record
-    are enough.
+    `monitor` starts its monitor, which `goes_on` then. The curves of the other drives have samples
+    before the last minute, see `open_past`.
     """
     clock, drives, watch = line.clock, fleet.consoles, fleet.line_watch
     shown = fleet.console(device) if device is not None else None
@@ -222,14 +226,14 @@ async def pass_lead(
         begin = max(begin, line.at - SECONDS_KEPT)
     begin = in_step(line, device, begin, period)
     for console in drives:
-        monitored = begin if console is shown else line.at
-        events = [e.utc / 1e6 for e in line.events if e.device == console.device]
-        times = past_times(clock.begin, line.at, events)
+        since, monitored = line.at - RECENT_SECONDS, line.at
         if console is shown:
-            cycles = _recorded_cycles(line, console.device, monitored)
-            times = [time for time in times if not cycles or time < cycles[0]] + cycles
+            since, monitored = line.at - PAST_SECONDS, begin
+        events = [e.utc / 1e6 for e in line.events if e.device == console.device]
         await asyncio.to_thread(_take_known, line, console.session)  # scales of the curve
-        await asyncio.to_thread(recall_past, line, console, watch, times, monitored)
+        past = watch.recorded[console.device] = RecordedCycles(line, console)
+        curve = await asyncio.to_thread(recall_past, past, watch, events, since, monitored)
+        await line.do(partial(_resume, console, curve), f"curve of {console.device}")
     if shown is not None:
         await line.run_to(begin, EXACT_TAKES)
         monitor(shown)
@@ -241,3 +245,20 @@ async def pass_lead(
     for console in drives:
         await asyncio.to_thread(_take_known, line, console.session)
         watch.keep(console.session, console.monitor)  # checks it at this time
+
+
+async def _resume(console: DriveConsole, curve: Trend) -> None:
+    """Continue a curve; in the line's loop, where nothing else adds to it."""
+    console.monitor.recall(curve)
+
+
+def open_past(line: ReplayLine, console: DriveConsole) -> None:
+    """Give the curve of a drive that is opened each recorded cycle; it takes a moment."""
+    until = line.clock.monotonic()
+
+    async def work() -> None:
+        past = RecordedCycles(line, console)
+        await _resume(console, await asyncio.to_thread(recorded_curve, past, until))
+
+    with suppress(LineError):
+        line.spawn(work, f"curve of {console.device}")

@@ -111,6 +111,10 @@ class MonitorScreen(CursorKeys):
         if self.app.replay is None or not self.console.monitor.started:
             beside = codes_beside(self.session.profile)
             self.console.monitor.start(period=self.app.period, extra=beside)
+            if self.app.replay is not None:
+                from tui.session.replay import open_past
+
+                open_past(self.app.replay, self.console)
         self._timer = self.set_interval(REFRESH, self._look_in_time)
 
     def _look_in_time(self) -> None:

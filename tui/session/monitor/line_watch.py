@@ -9,9 +9,10 @@ from __future__ import annotations
 
 import logging
 import threading
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Protocol
 
 from tui.bus.api import Contact, LineWorker, ModbusLine, Priority, contact_of
 from tui.bus.errors import LineError, LineLost
@@ -111,6 +112,16 @@ class _Kept:
     workers: tuple[LineWorker, ...] = ()
 
 
+class RecordedChecks(Protocol):
+    """Checks of a drive in a record; times are those of the record."""
+
+    def checks(self, until: float) -> Iterable[Look]:
+        """Return those that follow the last point of the drive's curve, up to a time."""
+
+    def rest(self, now: float, period: float) -> float:
+        """Return the seconds to the check about a period later; the period without one."""
+
+
 class LineWatch:
     """Keeps drives alive and checks their states, in workers of the line's loop."""
 
@@ -123,6 +134,8 @@ class LineWatch:
         self.onsets = FaultOnsets()
         self.least_period = GLANCE
         """Least seconds between two checks of a drive without a running monitor."""
+        self.recorded: dict[int, RecordedChecks] = {}
+        """By device, in a replay: its curves have these instead of its own checks."""
 
     @property
     def looks(self) -> Mapping[int, Look]:
@@ -331,7 +344,11 @@ class LineWatch:
                 state, error, kept.session.clock.monotonic(), timeout, readings, before, contact
             )
             self._looks = {**self._looks, device: look}
-            kept.monitor.add_to_trend(look)
+            recorded = self.recorded.get(device)
+            for check in (look,) if recorded is None else recorded.checks(look.time):
+                kept.monitor.add_to_trend(check)
+            if recorded is not None and kept.learned is not None:
+                return recorded.rest(look.time, self.glance_period)
         return self.glance_period if kept.learned is not None else GLANCE / 10
 
     def _take_monitored(self, kept: _Kept) -> None:

@@ -146,9 +146,13 @@ class Trend:
         self._points = deque(points[time] for time in times)
 
     def resume(self, earlier: Trend) -> None:
-        """Continue another trend of the drive, with the events since its last cycle."""
-        self.join(earlier.points)
-        self._marker = earlier._marker
+        """Continue another trend of the drive: it replaces the points up to its last one."""
+        if (last := earlier.last) is None:
+            return
+        later = [point for point in self._points if point.time > last.time]
+        self._points = deque((*earlier.points, *later))
+        if not later:
+            self._marker = earlier._marker
 
     def note_write(self, written: DeviceWritten) -> None:
         """Note a write to the drive by any program, for the mark of the next cycle."""

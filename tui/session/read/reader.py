@@ -181,7 +181,7 @@ class Reader:
     @property
     def in_force(self) -> dict[str, int]:
         """Return the raw value of each slot of a block or scanner that is certainly in force."""
-        return self._slots.in_force()
+        return self._slots.in_force() if self.session.reads_blocks else {}
 
     async def learn_slots(self) -> None:
         """Read the slots of the drive's block or scanner, so that polls can use it.

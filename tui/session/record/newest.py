@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -27,6 +27,10 @@ SOUGHT_AGAIN = 1_000_000
 """Microseconds after which the end of a file is read again: it may still be written."""
 REPEATED_WITHIN = 2_000_000
 """Microseconds within which a repeated request replaces the failed one before it."""
+BLOCK_FUNCTION = 3
+"""Function by which indirect blocks and scanners are read."""
+InBlock = Callable[[int], Mapping[int, tuple[int, int]]]
+"""By a time in microseconds: function and address of the parameter in each register of a block."""
 PAUSE_OF_CYCLES = 0.1
 """Seconds without a request that end a cycle of a monitor."""
 
@@ -83,6 +87,7 @@ class NewestReplies:
         """Number of exchanges without a reply since."""
         self.last_failure: RecordedReply | None = None
         self.mean_of: MeanOf = lambda place: None
+        self.in_block: InBlock = lambda utc: {}
 
     def move(self, at: int) -> None:
         """Go to a later time in microseconds, or begin there."""
@@ -128,13 +133,24 @@ class NewestReplies:
             key = reply.function, reply.address, reply.registers
             self._refused[key] = _later(self._refused.get(key), reply)
             return True
-        for register in range(reply.address, reply.address + reply.registers):
-            place = reply.function, register
-            before = self._by_register.get(place)
-            if before is not None and before.quality == GOOD != reply.quality:
-                self._good[place] = before
-            self._by_register[place] = _later(before, reply)
+        read = range(reply.address, reply.address + reply.registers)
+        for register in read:
+            self._note((reply.function, register), reply)
+        for register, (function, address) in self.in_block(reply.sent).items():
+            if register in read and reply.function == BLOCK_FUNCTION:
+                first = address - (register - reply.address)
+                self._note((function, address), reply._replace(function=function, address=first))
         return True
+
+    def _note(self, place: tuple[int, int], reply: RecordedReply) -> None:
+        before = self._by_register.get(place)
+        if before is not None and before.quality == GOOD != reply.quality:
+            self._good[place] = before
+        self._by_register[place] = _later(before, reply)
+
+    def has(self, function: int, register: int) -> bool:
+        """Return True if a register was read, or was to be."""
+        return (function, register) in self._by_register
 
     def last_words(self, function: int, address: int, count: int) -> tuple[tuple[int, ...], int]:
         """Return registers as they were read last, whatever has failed since; see `words`."""

@@ -6,17 +6,15 @@ import asyncio
 import math
 import sqlite3
 import threading
-from collections.abc import Callable, Coroutine, Iterator, Sequence
+from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import Future
-from contextlib import contextmanager, suppress
-from functools import partial
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
 from tui.bus.api import LineWorker
 from tui.bus.errors import (
     LineClosed,
-    LineFailed,
     LineLost,
     NoAnswer,
     RequestRefused,
@@ -40,13 +38,11 @@ from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
 from tui.bus.trace import Frame
 
-from .newest import NewestReplies, count_recorded
-from .reader import MOST_FILES
 from .rebuilt_frames import frames_of
 from .replay_clock import ReplayClock
-from .replay_reader import MeanOf, RecordedReply, ReplayReader
 from .replay_wire import replayed_link, wire_frame
-from .schema import EventRow, RecordDamaged, to_microseconds
+from .replayed_record import ReplayedRecord
+from .schema import RecordDamaged, to_microseconds
 
 T = TypeVar("T")
 
@@ -58,11 +54,9 @@ FRAMES_OF = 10.0
 """Seconds of the record whose frames are listed."""
 STARTS_WITHIN = 10.0
 """Seconds within which the thread of a line starts and ends."""
-_EVENTS = ("fault", "stop", "done", "failed", "alarm", "trigger", "notice", "commander")
-"""Kinds of recorded events to which a replay can jump."""
 
 
-class ReplayLine:
+class ReplayLine(ReplayedRecord):
     """A ModbusLine on a record; see tui.bus.api. Reads return what was known at the clock's time.
 
     A drive that did not answer then does not answer now. What was never read raises NotRecorded.
@@ -81,20 +75,8 @@ class ReplayLine:
         `files` are those of `path`, the oldest first, if it is not a file. Raises RecordDamaged,
         sqlite3.Error.
         """
-        self.path = path
-        self.files = list(files)[-MOST_FILES:] or [path]
-        self._reader = ReplayReader(*self.files)
-        try:
-            begin, end = (time / 1e6 for time in self._reader.span(path))
-            self.recorded_line = self._reader.line
-            self.devices = self._reader.devices()
-            self.events = tuple(self._reader.events_of(_EVENTS))
-            """Events to which a replay can jump, by time."""
-            self._profiles = self._reader.events_of(("profile",))
-            self._states = self._reader.events_of(("line",))
-        except BaseException:
-            self._reader.close()
-            raise
+        super().__init__(path, files)
+        begin, end = self.span
         start = begin if at is None else min(max(at, begin), end)
         self.at = start
         """The time at which the replay begins, after `lead`."""
@@ -109,65 +91,10 @@ class ReplayLine:
         self._frames: tuple[float, tuple[Frame, ...]] = (0.0, ())
         """The frames before a time."""
         self._tally = Tally(clock=self.clock.monotonic)
-        self._newest: dict[int, NewestReplies] = {}
-        self._lock = threading.RLock()
-        """Held while the record is read."""
         self._loop: asyncio.AbstractEventLoop | None = None
         self._thread: threading.Thread | None = None
         self._workers: set[asyncio.Task[object]] = set()
         self._closed = False
-
-    # The record
-
-    def profile_note(self, device: int) -> EventRow | None:
-        """Return the event that names a device's profile by now; the first one if it came later."""
-        now = to_microseconds(self.clock.monotonic())
-        own = [event for event in self._profiles if event.device == device]
-        by_now = [event for event in own if event.utc <= now]
-        return by_now[-1] if by_now else own[0] if own else None
-
-    def identification(self, device: int, function: int) -> IdentificationObjects | None:
-        """Return what a device reported by a function; None if it is not recorded."""
-        with self._reading():
-            return self._reader.identification(device, function)
-
-    def last_reply(self, device: int, function: int, address: int, count: int) -> Reply:
-        """Return the registers as they were read last, whatever has failed since."""
-        with self._reading():
-            words, ended = self._of(device).last_words(function, address, count)
-        return Reply(words, ended / 1e6)
-
-    @contextmanager
-    def _reading(self) -> Iterator[None]:
-        try:
-            with self._lock:
-                yield
-        except sqlite3.Error as error:
-            raise LineFailed(f"The record cannot be read: {error}.") from error
-
-    def last_before(self, device: int, since: float, at: float, most: int) -> list[RecordedReply]:
-        """Return the last replies of a device in a time of the record, the newest first."""
-        span = to_microseconds(since), to_microseconds(at)
-        try:
-            with self._lock:
-                return self._reader.last_before(device, *span, most)
-        except sqlite3.Error:
-            return []
-
-    def use_means(self, device: int, mean_of: MeanOf) -> None:
-        """Set which registers of a device have a mean, for replies that were reduced."""
-        with self._lock:
-            self._of(device).mean_of = mean_of
-
-    def _of(self, device: int) -> NewestReplies:
-        """The newest replies of a device, at the present time; with the lock."""
-        if device not in self._newest:
-            self._newest[device] = NewestReplies(
-                self._reader, device, partial(count_recorded, self._tally, device)
-            )
-        newest = self._newest[device]
-        newest.move(to_microseconds(self.clock.monotonic()))
-        return newest
 
     # A line
 
@@ -361,19 +288,27 @@ class ReplayLine:
 
         If it takes more than `takes` seconds of processor time, the rest is left out.
         """
-        done: Future[object] = Future()
+
+        async def run() -> None:
+            end = min(at, self.clock.end)
+            if not await self.clock.run_to(end, takes):
+                self.clock.skip_to(end)
+
+        await self.do(run, "replay to a time")
+
+    async def do(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> None:
+        """Run a coroutine in the line's loop to its end; for the loop of any thread."""
+        done: Future[None] = Future()
 
         async def run() -> None:
             try:
-                end = min(at, self.clock.end)
-                if not await self.clock.run_to(end, takes):
-                    self.clock.skip_to(end)
+                await work()
                 done.set_result(None)
             except BaseException as error:
                 done.set_exception(error)
                 raise
 
-        self.spawn(run, "replay to a time")
+        self.spawn(run, name)
         await asyncio.wrap_future(done)
 
 

@@ -203,6 +203,22 @@ class ReplayReader(RecordReader):
             )
         return sorted(found, key=attrgetter("ended"), reverse=True)
 
+    def last_of_each(self, device: int, since: int, until: int) -> list[RecordedReply]:
+        """Return the last replies of each quality to each read in a time, the oldest first."""
+        form = (
+            "SELECT {}, max(utc) FROM {} WHERE device = ? AND utc BETWEEN ? AND ?"
+            " AND utc + took <= ? AND function IN (3, 4)"
+            " GROUP BY function, address, registers, {}"
+        )
+        where = device, since, until, until
+        rows = self._base.execute(form.format(_REPLY, "reply", "quality"), where).fetchall()
+        if rows:
+            found = list(map(reply_in, rows))
+        else:
+            old = self._base.execute(form.format(_REDUCED, "reduced", "good > 0"), where)
+            found = list(map(reduced_in, old))
+        return sorted(found, key=attrgetter("ended"))
+
     def exchanges_of(self, device: int, since: int, until: int) -> list[ReplyRow]:
         """Return the exchanges of a device whose request was sent in a time."""
         found = self._base.execute(
