@@ -13,6 +13,7 @@ from textual.theme import Theme
 
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.keys.table import bindings
+from tui.screens.opening import OpeningScreen
 from tui.screens.places import DriveKeys, ParameterPlaces
 from tui.session.clock import Clock
 from tui.session.connect.open_line import open_line
@@ -134,8 +135,6 @@ class DrivePanelApp(
         """Open the line that was named."""
         first: Screen[None] = self.connection
         if self._start is not None and self._device is not None:
-            from tui.screens.opening import OpeningScreen
-
             first = OpeningScreen(self._start, self._device)
             self.push_screen(first)
         self.set_interval(FRAME_LOOK, self.look_around)

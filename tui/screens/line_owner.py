@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineClosed
+from tui.session.events import EventLog
 from tui.session.paths import remember_line
 from tui.terminal.loop import soon_in_loop
 
@@ -110,7 +111,6 @@ class LineOwner(Panel):
 
         The drive `device` was monitored before that time; if it `goes_on`, it still is.
         """
-        from tui.session.events import EventLog
         from tui.session.fleet import Fleet
         from tui.session.replay import UnwrittenJournal, add_trips, pass_lead, take_drives
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
+import msgspec
+
 from tui.drive.small_file import open_regular
 
 from .connect.line_key import line_key
@@ -130,8 +132,6 @@ def _lines(file: Path) -> Iterator[tuple[int, bytes]]:
 
 
 def _entry(line: bytes) -> Entry | None:
-    import msgspec
-
     try:
         # not by msgspec alone: it takes no half of a character, which a drive's name may hold
         return msgspec.convert(json.loads(line), Entry)

@@ -13,8 +13,13 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+from tui.drive.chart import ENABLED_KINDS
+from tui.session.signals import BY_SIGNAL
+
 from ..documents.document import DocumentPart, DriveDocument
 from ..running.buffered_output import BufferedOutput
+from ..shared import asking
+from ..shared.asking import says_yes
 from ..shared.drive_commands import arm_drive, arm_option, complain, need_arming, watched
 from ..shared.errors import (
     DIFFERENT,
@@ -257,15 +262,12 @@ class AcceptSession:
         if result.passed:
             return 0
         if ending.number:
-            from tui.session.signals import BY_SIGNAL
-
             return BY_SIGNAL + ending.number
         return ENDED_AFTER_WRITING if result.ended_by else DIFFERENT
 
     async def _confirm(self, console: DriveConsole, ending: Ending, high: HighSpeed | None) -> None:
         """Show what will move; arm after a yes. Raises Failure, with nothing written."""
         from ..running.keyboard import ended_by_typing
-        from ..shared.asking import says_yes
 
         _may_arm(console)
         self._need_standstill(console)
@@ -286,7 +288,6 @@ class AcceptSession:
 
     def _need_standstill(self, console: DriveConsole) -> None:
         """Raise Failure if the drive runs, is in fault, or its state is not known."""
-        from tui.drive.chart import ENABLED_KINDS
         from tui.session.running.watching import latest_of
 
         state = latest_of(console).state
@@ -303,11 +304,10 @@ class AcceptSession:
     async def _ask_turned(self, question: str) -> str:
         """Ask which way the motor turned; return nothing for any answer but r and l."""
         from ..running.keyboard import ended_by_typing
-        from ..shared.asking import typed_answer
 
         self._stack.close()  # what is typed now is the answer
         try:
-            answer = await typed_answer(f"{question} [r right / l left]")
+            answer = await asking.typed_answer(f"{question} [r right / l left]")
         finally:
             if self._ending is not None:
                 self._stack.enter_context(ended_by_typing(self._ending))

@@ -156,7 +156,6 @@ def backup(
     from tui.drive.settings.parameter_set import dump_set
 
     from ..documents.setting_documents import BackupDocument
-    from ..shared.output import drive_fields, print_json
 
     refuse_output(file, force=force, as_json=as_json)
     try:

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.bus.errors import LineError
+
 from ..shared.block_output import show_blocks, show_neighbors
 from ..shared.drive_commands import (
     arm_option,
@@ -190,7 +192,6 @@ def _save(session: DriveSession, line_text: str, views: list[BlockView], wanted:
 
 
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
-    from tui.bus.errors import LineError
     from tui.session.blocks.write import AssignmentRefused, write_assignment
     from tui.session.settings.write import NotTaken
 

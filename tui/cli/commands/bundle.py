@@ -21,7 +21,7 @@ from ..shared.options import (
     profile_of,
 )
 from ..shared.registration import ON_LINE, command
-from ..shared.say import Messages
+from ..shared.say import Messages, say_over
 from ..shared.sets import refuse_output, write_down
 from ..shared.standard_streams import STANDARD
 
@@ -189,8 +189,6 @@ def _progress() -> PartProgress | None:
     """Show the current part in one line of a terminal; None without one."""
     if not sys.stderr.isatty():
         return None
-    from ..shared.say import say_over
-
     width = 0
 
     def show(done: int, of: int, name: str) -> None:

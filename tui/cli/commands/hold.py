@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Protocol
 
 import click
+from msgspec import UNSET
 
 from ..shared.drive_commands import complain
 from ..shared.errors import LINE_TROUBLE, Failure, status_of
@@ -141,8 +142,6 @@ def _teller(_event: HoldEvent, _device: int, text: str, _found: Timeout | None =
 
 
 def _json_teller(line_text: str) -> HeldTeller:
-    from msgspec import UNSET
-
     from ..documents.drive_documents import HoldDocument
     from ..shared.output import iso_time, print_json
 

@@ -17,6 +17,7 @@ from ..shared.options import (
     read_only_option,
     several_devices_option,
 )
+from ..shared.output import drive_fields
 from ..shared.pending_timeouts import look_after
 from ..shared.registration import ON_LINE, command
 from ..shared.rows import say_row, titled
@@ -49,7 +50,6 @@ def identify(
     from tui.session.connect.identify import identify_drive as ask
 
     from ..documents.drive_documents import IdentityDocument
-    from ..shared.output import drive_fields
 
     target = Target(line_text, device[0], None, others=device[1:])
     sessions: list[DriveSession] = []

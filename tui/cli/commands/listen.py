@@ -12,18 +12,27 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.bus.errors import LineError
 from tui.bus.listening_line import ListeningLine
+from tui.drive.profile import library
 from tui.session.capture_file import CaptureFile
-from tui.session.listening.background import PortListener
-from tui.session.listening.families import Families
+from tui.session.connect.address_prober import known_profiles
+from tui.session.listening.background import (
+    CannotListen,
+    PlaceToListen,
+    PortListener,
+    line_to_listen,
+)
+from tui.session.listening.families import Families, remembered_families
 from tui.session.listening.listener import DecodedExchange
 from tui.session.signals import BY_SIGNAL, signal_name
+from tui.wire.capture.forms import READ_RAW
 from tui.wire.observed.splitting import ObservedFrame
 
 from ..shared.completion import complete_line, complete_profile
 from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, file_failures
 from ..shared.line_argument import LineArgument
-from ..shared.listen_outputs import ListenOutput
+from ..shared.listen_outputs import ListenJsonOutput, ListenNoOutput, ListenOutput, ListenTextOutput
 from ..shared.numbers import seconds
 from ..shared.options import json_option
 from ..shared.registration import command
@@ -33,7 +42,6 @@ from ..shared.standard_streams import STANDARD
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
-    from tui.session.listening.background import PlaceToListen
 
 PROGRAM_NAME = "listen"
 LAST_ADDRESS_HEARD = 255
@@ -99,13 +107,6 @@ def listen(
     if to_output and as_json:
         raise click.UsageError("Either --pcap - or --json: both write to standard output.")
     named = profiles_named(profile_ids)
-    from tui.bus.errors import LineError
-    from tui.session.connect.address_prober import known_profiles
-    from tui.session.listening.background import line_to_listen
-    from tui.session.listening.families import Families, remembered_families
-
-    from ..shared.listen_outputs import ListenJsonOutput, ListenNoOutput, ListenTextOutput
-
     with (
         never_suspended(),
         interrupted_by_signal() as came,
@@ -145,8 +146,6 @@ def _serial_line(
     opening: AbstractContextManager[PlaceToListen],
 ) -> Iterator[PlaceToListen]:
     """The line that is meant; raises UsageError if it is not a serial line."""
-    from tui.session.listening.background import CannotListen
-
     with ExitStack() as stack:
         try:
             place = stack.enter_context(opening)
@@ -157,8 +156,6 @@ def _serial_line(
 
 def profiles_named(given: tuple[str, ...]) -> dict[int | None, Profile]:
     """Profiles by address, with None for that of all others; raises UsageError, UnknownProfile."""
-    from tui.drive.profile import library
-
     found: dict[int | None, Profile] = {}
     for text in given:
         address, sign, profile_id = text.rpartition("=")
@@ -173,8 +170,6 @@ def profiles_named(given: tuple[str, ...]) -> dict[int | None, Profile]:
 
 def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> CaptureFile | None:
     """The capture file; None without --pcap. Raises Failure if it cannot be written."""
-    from tui.session.capture_file import CaptureFile
-
     if path is None:
         return None
     with file_failures(path):
@@ -183,8 +178,6 @@ def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> Cap
 
 
 def _say_begin(port: str, raw_file: Path | None, *, err: bool) -> None:
-    from tui.wire.capture.forms import READ_RAW
-
     say(f"Listening at {port}; nothing is sent. Ctrl-C ends it.", err=err)
     if raw_file is not None:
         say("To read the file:", err=err)

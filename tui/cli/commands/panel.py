@@ -6,6 +6,8 @@ from typing import Any
 
 import click
 
+from tui.session.paths import recent_lines
+
 from ..opening import DEMO_LINE, LEAVE_RUNNING, STOP, open_panel, terminal_trouble
 from ..shared.completion import complete_line
 from ..shared.errors import USAGE, Failure
@@ -73,7 +75,6 @@ def _as_used_last(line_text: str) -> str:
     """Return a port that names no settings with those of its last use, as the form of Line does."""
     from tui.session.connect.named_lines import named_lines
     from tui.session.connect.port_settings import with_last_settings
-    from tui.session.paths import recent_lines
 
     if any(line.line == line_text for line in named_lines().values()):
         return line_text  # what the settings file says

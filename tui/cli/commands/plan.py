@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import click
 from msgspec import Meta
 
+from tui.drive.plain import plain
 from tui.drive.sentences import counted
 
 from ..documents.document import Document, DocumentPart
@@ -341,9 +343,6 @@ class PlanResult:
 def _wrapped(head: str, text: str) -> list[str]:
     """Return a text in lines of the terminal's width, below its head."""
     import textwrap
-    from shutil import get_terminal_size
-
-    from tui.drive.plain import plain
 
     width = max(60, min(100, get_terminal_size().columns))
     return textwrap.wrap(plain(text), width, initial_indent=head, subsequent_indent=" " * len(head))

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import get_terminal_size
 from typing import TYPE_CHECKING
 
 import click
+import msgspec
 
+from tui.drive.errors import ProfileError
 from tui.drive.plain import plain
+from tui.drive.profile.profile import Profile, is_verified, notations, proof_text
+from tui.drive.values import raw_range
 
 from ..shared.completion import complete_profile
 from ..shared.drive_commands import arm_option, need_arming
@@ -22,7 +27,6 @@ from ..shared.standard_streams import given_file
 
 if TYPE_CHECKING:
     from tui.drive.profile.library import Listing
-    from tui.drive.profile.profile import Profile
 
 PARAMETER_COLUMNS = (
     Column("Code"),
@@ -271,9 +275,7 @@ def _remark(listing: Listing) -> str:
 
 def _public_remark(listing: Listing) -> str:
     """Return that a profile is public, and what the evidence of this site has proved of it."""
-    from tui.drive.errors import ProfileError
     from tui.drive.profile import library
-    from tui.drive.profile.profile import proof_text
 
     if not library.evidence_folder().is_dir():
         return "public, unproved"  # nothing else needs the whole file
@@ -284,8 +286,6 @@ def _public_remark(listing: Listing) -> str:
 
 
 def _show_wiring(profile: Profile, as_json: bool) -> None:
-    from shutil import get_terminal_size
-
     from tui.drive.family_page import family_page, page_lines
 
     from ..documents.other_documents import WiringDocument, WiringRowField, WiringSectionField
@@ -327,15 +327,10 @@ def _show(profile: Profile, as_json: bool) -> None:
     from ..shared.output import console, print_json
 
     if as_json:
-        import msgspec
-
         from ..documents.other_documents import ProfileShown
 
         print_json(ProfileShown(**msgspec.to_builtins(profile.data)))
         return
-    from tui.drive.profile.profile import is_verified, notations
-    from tui.drive.values import raw_range
-
     link = profile.data.link
     screen = console()
     screen.print(

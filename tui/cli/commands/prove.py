@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.asking import may_ask, says_yes
 from ..shared.drive_commands import (
     arm_drive,
     arm_option,
@@ -96,8 +97,6 @@ def prove(
 
 async def _ask_on_the_run(device: int) -> None:
     """A motor that turns is left to its drive only with a yes; raises Failure without one."""
-    from ..shared.asking import may_ask, says_yes
-
     if not may_ask():
         raise Failure(f"{ON_THE_RUN} --yes says that this is meant.", REFUSED_HERE)
     complain(ON_THE_RUN)

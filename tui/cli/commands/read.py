@@ -19,6 +19,7 @@ from ..shared.options import (
     line_argument,
     read_only_option,
 )
+from ..shared.output import drive_fields, print_readings, value_field
 from ..shared.registration import ON_LINE, command
 from ..shared.say import say
 
@@ -53,7 +54,6 @@ def read(
     from tui.session.read.retrying_reader import read_apart
 
     from ..documents.drive_documents import ReadDocument
-    from ..shared.output import drive_fields, print_readings, value_field
 
     sessions: list[DriveSession] = []
 

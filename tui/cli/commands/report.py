@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,6 +14,7 @@ import click
 from ..shared.drives import USUAL_SEARCH
 from ..shared.errors import INTERRUPTED, Failure, end_with
 from ..shared.options import Target, json_option, line_argument, never_forced, several_settings
+from ..shared.output import drive_fields, print_json
 from ..shared.registration import ON_LINE, command
 from ..shared.say import Messages
 from ..shared.sets import file_argument, force_option, refuse_output, set_of_drive, write_down
@@ -122,8 +124,6 @@ def report(
     lines for signatures. The suffix of FILE selects its form, and .html needs no --page. Several -d
     or --all write a page for each drive.
     """
-    import time
-
     from tui.session.connect.recorded_line import record_files
     from tui.session.journal import Journal
     from tui.session.journal_reading import entries_of
@@ -132,7 +132,6 @@ def report(
     from tui.session.startup.lines import start_up_lines
 
     from ..documents.setting_documents import ReportDocument
-    from ..shared.output import drive_fields, print_json
 
     refuse_output(file, force=force, as_json=as_json)
     if addresses and not every:

@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, TypedDict
 
 import click
 
+from tui.bus.errors import RequestRefused
 from tui.drive.sentences import first_of, sentence
 
+from ..shared.asking import wear_gate
 from ..shared.drive_commands import (
     arm_option,
     close_journal,
@@ -29,6 +31,7 @@ from ..shared.options import (
     profile_option,
     read_only_option,
 )
+from ..shared.output import drive_fields
 from ..shared.registration import WRITING, command
 from ..shared.say import Messages
 from ..shared.sets import (
@@ -132,7 +135,6 @@ def restore(
 
     from ..documents.setting_documents import RestoreDocument
     from ..running.recipe_comparison import recipes_in
-    from ..shared.output import drive_fields
 
     _either(dry_run=dry_run, arm=arm)
     newest = str(file) == NEWEST and not file.exists()
@@ -298,13 +300,10 @@ async def _restore(
     *,
     save: bool,
 ) -> tuple[_Restored, int]:
-    from tui.bus.errors import RequestRefused
     from tui.drive.profile import library
     from tui.session.settings.eeprom import refuse_frequent_save, save_to_eeprom
     from tui.session.settings.restore import Mark, plan_for
     from tui.session.settings.restore import restore_set as bring_back
-
-    from ..shared.asking import wear_gate
 
     source, messages = library.load(values.head.profile), telling.messages
     if session.line.read_only:

@@ -11,6 +11,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.bus.api import LineStatus, ModbusLine, Priority
+from tui.bus.errors import DeviceException, LineError, LineLost
+from tui.drive.chart import watched_codes
+from tui.drive.orders import INSTEAD, deciding_codes
+from tui.session.connect.addresses import parse_addresses
+
 from ..running.stop_targets import (
     StoppableDrive,
     StopWish,
@@ -36,7 +42,6 @@ from ..shared.pending_timeouts import PolledDrive, look_after
 from ..shared.registration import WRITING, command
 
 if TYPE_CHECKING:
-    from tui.bus.api import ModbusLine
     from tui.drive.profile.schema import OrderId
     from tui.session.command.stop import Stopper
     from tui.session.command.stop_report import StopReport
@@ -96,8 +101,6 @@ def stop(
         raise click.UsageError("--give-back is for one drive, not for several.")
     if read_only:
         raise Failure("The line is read-only: nothing is written, not even a stop.", REFUSED_HERE)
-    from tui.bus.api import LineStatus
-
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
     devices = _devices(addresses) if every else [item.device for item in target.each()]
     telling = StopTelling(target.line_text, as_json=as_json)
@@ -127,8 +130,6 @@ def stop(
 
 
 def _devices(text: str | None) -> list[int]:
-    from tui.session.connect.addresses import parse_addresses
-
     return parse_addresses(text) if text is not None else []
 
 
@@ -182,7 +183,6 @@ async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
     Returns the exit status and the session. Raises UsageError if no word is known that stops it,
     NoAnswer if it does not answer.
     """
-    from tui.bus.errors import LineLost
     from tui.session.command.stop import Stopper
 
     before = (await remembered(wish.opened)).get(device)
@@ -198,7 +198,6 @@ async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
 
 async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish) -> int:
     """Stop a drive, report the result; returns the exit status."""
-    from tui.drive.orders import INSTEAD
     from tui.session.command.motor_stop import with_other_way
     from tui.session.command.stop_report import Phase
 
@@ -224,8 +223,6 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
 
 async def _why(session: DriveSession) -> int:
     """The status of a stop that failed: whether the drive answers at all."""
-    from tui.bus.errors import DeviceException, LineError
-    from tui.drive.chart import watched_codes
     from tui.session.read.reader import Reader
 
     try:
@@ -246,8 +243,6 @@ async def _stop_all(wish: StopWish, named: Sequence[int]) -> int:
     one has that says anything; others are asked once more, as a search does. Where its family is
     named, too, it is sent the stop word although it is silent: perhaps it hears.
     """
-    from tui.bus.api import Priority
-    from tui.bus.errors import LineError
     from tui.session.command.stop import Stopper
 
     opened, telling = wish.opened, wish.telling
@@ -307,7 +302,6 @@ WAITS = "a run command that waits at the terminals starts the motor"
 
 async def give_control_back(session: DriveSession, *, arm: bool) -> str:
     """Give it back; the motor was stopped before. Its result; raises Failure."""
-    from tui.drive.orders import deciding_codes
     from tui.session.command.commander import Commander
     from tui.session.read.reader import Reader
 

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, TypedDict
 
 import click
 
+from tui.drive.errors import ValueRefused
+
+from ..shared.asking import wear_gate
 from ..shared.completion import complete_setting
 from ..shared.drive_commands import (
     arm_option,
@@ -147,7 +150,6 @@ async def _staged(
     Raises ValueRefused if a parameter is never written as a setting, or if a value would be rounded
     to another one without --round.
     """
-    from tui.drive.errors import ValueRefused
     from tui.drive.settings.edits import consequences
     from tui.drive.settings.writable import write_refusal
     from tui.session.settings.typed import WouldRound, stage_typed
@@ -210,8 +212,6 @@ async def _write(
     """Write, report each; the results for JSON, and the exit status."""
     from tui.session.settings.apply import apply_edits
     from tui.session.settings.eeprom import refuse_frequent_save, save_to_eeprom
-
-    from ..shared.asking import wear_gate
 
     messages = telling.messages
     if not len(edits):

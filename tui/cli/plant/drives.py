@@ -10,6 +10,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
 
+from tui.bus.api import Contact, Priority, contact_of
+from tui.bus.errors import DeviceException, LineError
+from tui.session.monitor.rates import monitoring_codes
+
 from ..shared.cycles import Cycles
 from ..shared.errors import failure_of
 from ..shared.options import Target, connect_drive
@@ -17,7 +21,6 @@ from ..shared.say import say
 from .status import DriveStatus, LineReport, drive_status_of
 
 if TYPE_CHECKING:
-    from tui.bus.api import Contact
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.monitor.snapshot import Snapshot
@@ -168,8 +171,6 @@ class PlantDrive:
 
     async def _requested(self) -> DriveSession | None:
         """Return the drive; None if it is not found, and report the reason when it changes."""
-        from tui.bus.api import contact_of
-
         if self._sign(self.device) is not None:
             # not identified before: never keep a motor alive whose client may have exited
             self._error = f"Device {self.device} was not identified: a client runs its motor."
@@ -193,8 +194,6 @@ class PlantDrive:
 
     async def _answers(self) -> None:
         """Send one request with a short timeout, because others use the line. Raises NoAnswer."""
-        from tui.bus.api import Priority
-        from tui.bus.errors import DeviceException
         from tui.drive.profile import library
         from tui.session.connect.contradiction import read_status
         from tui.session.connect.identify import identify_drive
@@ -215,8 +214,6 @@ class PlantDrive:
         self._changed()
 
     def _shown(self, session: DriveSession) -> list[str]:
-        from tui.session.monitor.rates import monitoring_codes
-
         profile = session.profile
         return [profile.find(code).code for code in self._codes] or monitoring_codes(profile)
 
@@ -260,8 +257,6 @@ class PlantDrive:
 
 async def _learn_timeout(session: DriveSession) -> None:
     """Read the communication timeout of the drive again; after an error, it is read again later."""
-    from tui.bus.api import Priority
-    from tui.bus.errors import LineError
     from tui.session.monitor.timeout import read_timeout
     from tui.session.read.reader import Reader
 

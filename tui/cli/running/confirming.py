@@ -8,7 +8,11 @@ from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
 import tui
+from tui.drive.errors import ValueRefused
+from tui.drive.profile.schema import EvidenceDrive, EvidenceFinding, Parameter, ProfileEvidence
 from tui.drive.sentences import counted
 
 from ..shared.asking import may_ask, says_yes, typed_answer
@@ -21,7 +25,6 @@ from ..shared.sets import counter, write_down
 from ..shared.standard_streams import STANDARD
 
 if TYPE_CHECKING:
-    from tui.drive.profile.schema import EvidenceFinding, Parameter, ProfileEvidence
     from tui.session.conformance import Conformance
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
@@ -85,7 +88,6 @@ async def _kind(opened: OpenLine) -> str:
 
 async def _ask_display(test: Conformance, code: str) -> None:
     """Ask until the answer is a value, or is left open."""
-    from tui.drive.errors import ValueRefused
 
     async def ask(parameter: Parameter) -> str:
         if not may_ask():
@@ -107,7 +109,6 @@ async def _ask_display(test: Conformance, code: str) -> None:
 
 
 def _evidence(session: DriveSession, findings: list[EvidenceFinding], kind: str) -> ProfileEvidence:
-    from tui.drive.profile.schema import EvidenceDrive, ProfileEvidence
     from tui.session.journal import now_text
 
     identity = session.known_identity
@@ -149,8 +150,6 @@ def _write(path: Path, evidence: ProfileEvidence, *, force: bool) -> None:
 
 
 def _document(evidence: ProfileEvidence, path: Path) -> ConfirmDocument:
-    import msgspec
-
     from ..documents.drive_documents import ConfirmDocument, FindingField
 
     return ConfirmDocument(

@@ -10,7 +10,7 @@ import click
 
 from tui.drive.sentences import counted
 
-from ..documents.other_documents import ProofDocument, ProofStepField
+from ..documents.other_documents import CheckDocument, ProofDocument, ProofStepField
 from ..shared.errors import DIFFERENT, REFUSED_HERE, USAGE, Failure
 from ..shared.options import Target
 from ..shared.output import print_json
@@ -28,9 +28,6 @@ def check_files(files: list[Path], as_json: bool) -> None:
     """Report every fault of every file; status 2 if there is one."""
     from tui.drive.profile import library
     from tui.drive.profile.register_identity import shared_identification
-
-    from ..documents.other_documents import CheckDocument
-    from ..shared.output import print_json
 
     found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
     found |= {path: shared_identification(path) for path, faults in found.items() if not faults}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from tui.drive.finding import LineSetting, WatchingFamily, watching_text
 from tui.drive.plain import plain
+from tui.drive.profile import library
 from tui.drive.sentences import any_of
 from tui.session.connect.search import LEFT_ALONE
 
@@ -196,8 +197,6 @@ def hit_document(line_text: str, hit: Hit) -> ScanHitDocument:
 
 def hit_text(hit: Hit) -> str:
     """Which drive it is, as far as it is known."""
-    from tui.drive.profile import library
-
     who = hit.identity
     names = {listing.id: (listing.name, listing.vendor) for listing in library.listings()}
     if hit.sure == "identified":

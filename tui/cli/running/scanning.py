@@ -9,7 +9,12 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import PortRefused
-from tui.drive.finding import LineSetting
+from tui.bus.link import SerialLink, TcpLink
+from tui.drive.errors import DriveError
+from tui.drive.finding import LineSetting, watching_families
+from tui.drive.profile import library
+from tui.session.connect.address_prober import known_profiles
+from tui.session.connect.search import Search
 
 from ..shared.asking import may_ask, says_yes
 from ..shared.errors import REFUSED_HERE, Failure
@@ -21,7 +26,6 @@ if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
     from tui.session.connect.open_line import OpenLine
     from tui.session.connect.scan_estimate import ScanEstimate
-    from tui.session.connect.search import Search
     from tui.session.diagnosis.remarks import LineRemarks
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
@@ -59,8 +63,6 @@ class Scan:
 
     async def run(self) -> None:
         """Listen, then search. Raises Failure before anything is sent, and the line's errors."""
-        from tui.drive.finding import watching_families
-        from tui.session.connect.address_prober import known_profiles
         from tui.session.diagnosis.asking import FRAMES_COME_WITHIN
         from tui.session.diagnosis.remarks import LineRemarks
 
@@ -83,7 +85,6 @@ class Scan:
 
     async def _listen(self) -> None:
         """Nothing is sent on a line on which another master asks. Raises Failure."""
-        from tui.bus.link import TcpLink
         from tui.session.connect.other_masters import LISTEN, listen_first
 
         line = self.opened.line
@@ -98,15 +99,12 @@ class Scan:
     @property
     def setting(self) -> LineSetting | None:
         """Setting at which the line is open; None over a network."""
-        from tui.bus.link import SerialLink
-
         link = self.opened.line.link
         return LineSetting(link.baud, link.format) if isinstance(link, SerialLink) else None
 
     async def _at_this_setting(self, remarks: LineRemarks, *, last: bool) -> bool:
         """Ask all addresses; whether other settings may be tried, with what is found held on."""
         from tui.session.connect.other_masters import MasterDetector
-        from tui.session.connect.search import Search
 
         if (setting := self.setting) is not None:
             self.tried.append(setting)
@@ -212,8 +210,6 @@ class Scan:
 
     def _session(self, who: DriveIdentity) -> DriveSession | None:
         """A session by the profile, or the likeliest of several; None where none fits."""
-        from tui.drive.errors import DriveError
-        from tui.drive.profile import library
         from tui.session.drive import DriveSession
 
         named = who.profile or next(iter(who.candidates), None)
@@ -272,6 +268,5 @@ def _ready_for_hits() -> None:
     import tui.session.fleet
     import tui.session.journal
     import tui.session.monitor.timeout  # noqa: F401
-    from tui.drive.profile import library
 
     library.matching_profiles("-")

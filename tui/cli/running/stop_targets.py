@@ -8,12 +8,15 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tui.bus.api import LineStatus, Priority
+from tui.bus.errors import ExchangeError, LineError, NoAnswer
+from tui.drive.errors import DriveError
+
 from ..shared.drive_commands import complain
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
 from ..shared.profile_choice import unidentified
 
 if TYPE_CHECKING:
-    from tui.bus.api import Priority
     from tui.drive.profile.schema import OrderId
     from tui.session.command.first_stop import FirstStop
     from tui.session.connect.identify import DriveIdentity
@@ -66,8 +69,6 @@ async def first_stopped(wish: StopWish, device: int, before: StartRecord | None)
     `before` is the last start of its motor from here. Raises UsageError where it is not known what
     stops it, NoAnswer where it is not there, Failure where it took no stop word.
     """
-    from tui.bus.api import LineStatus, Priority
-    from tui.bus.errors import ExchangeError, NoAnswer
     from tui.drive.first_stop import families_beside
     from tui.drive.profile.stop_profile import stop_profile
     from tui.session.command.first_stop import stop_first
@@ -124,7 +125,6 @@ def _by_what_is_known(
 
     The user's profile is final unless the drive identifies itself as one of another family.
     """
-    from tui.drive.errors import DriveError
     from tui.drive.profile import library
     from tui.session.connect.contradiction import contradiction
 
@@ -184,8 +184,6 @@ async def found_at(
     sent the word that stops them all first. Raises what `first_stopped` raises, Failure for answers
     that are none; where it is asked shortly, LineError.
     """
-    from tui.bus.api import LineStatus, Priority
-    from tui.bus.errors import LineError, NoAnswer
     from tui.session.connect.identify import identify_drive
 
     line = wish.opened.line

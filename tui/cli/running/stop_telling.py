@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from msgspec import UNSET
+
 from tui.session.connect.addresses import addresses_text
 
 from ..shared.drive_commands import complain
@@ -79,8 +81,6 @@ class StopTelling:
         self.documents[-1].given_back = text
 
     def _keep(self, device: int, profile: str | None, text: str, status: int) -> None:
-        from msgspec import UNSET
-
         from ..documents.drive_documents import StopDocument
 
         self.documents.append(

@@ -8,9 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tui.drive.channel import switch_texts
+from tui.drive.chart import watched_codes
+from tui.drive.command_blocked import blocked_reason, state_refusal
+from tui.drive.communication_words import communication_words
+from tui.drive.hints import alarm_words
+from tui.drive.orders import chart_in_force, deciding_codes, interlock_codes
 from tui.drive.sentences import sentence
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.patience import patience
+from tui.session.reading import Reading, with_text
 
 from .control import control_field, control_row
 from .errors import DONE, LINE_TROUBLE
@@ -27,7 +34,6 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.eeprom_counts import DriveCounts
-    from tui.session.reading import Reading
     from tui.session.timeout_report import Timeout, TimeoutWatch
 
     from ..documents.drive_documents import StatusDocument
@@ -130,7 +136,6 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     Raises the line's errors if no value arrives.
     """
     from tui.bus.errors import ExchangeError
-    from tui.drive.channel import switch_texts
     from tui.session.drive_state import drive_state
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
@@ -175,11 +180,6 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
 
 
 def _codes(profile: Profile) -> list[str]:
-    from tui.drive.chart import watched_codes
-    from tui.drive.communication_words import communication_words
-    from tui.drive.hints import alarm_words
-    from tui.drive.orders import deciding_codes, interlock_codes
-
     channels = [profile.quantity(quantity) for quantity in CHANNEL_NAMES]
     codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
     codes += [parameter.code for parameter in channels if parameter is not None]
@@ -209,8 +209,6 @@ def _channels(
 
 
 def _refused(session: DriveSession) -> str:
-    from tui.drive.command_blocked import blocked_reason, state_refusal
-    from tui.drive.orders import chart_in_force
     from tui.session.command.unblock_hint import block_reason_text
 
     raws = session.image.raws
@@ -356,7 +354,6 @@ async def read_until(
     """
     from tui.bus.errors import ExchangeError
     from tui.session.read.reader import Reader
-    from tui.session.reading import with_text
 
     readings: dict[str, Reading] = {}
     failure: Exception | None = None

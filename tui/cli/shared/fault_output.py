@@ -18,12 +18,12 @@ from tui.drive.hints import (
     reset_ready,
     reset_text,
 )
+from tui.drive.profile.schema import FaultHelp, Hint
 from tui.session.reading import Reading, with_text
 from tui.session.shown import Quality
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
-    from tui.drive.profile.schema import Hint
     from tui.session.console import DriveConsole
     from tui.session.drive_state import DriveState
 
@@ -59,8 +59,6 @@ class FaultFinding:
 
     def reset(self) -> ResetText:
         """Return how the fault is reset."""
-        from tui.drive.profile.schema import FaultHelp
-
         help_ = self.hint if isinstance(self.hint, FaultHelp) else None
         return reset_text(help_, self.ready, RESET_BY, self.follows())
 
@@ -172,8 +170,6 @@ def _look_fields(found: FaultFinding) -> list[LookField]:
 
 
 def _reset_field(found: FaultFinding) -> ResetField:
-    from tui.drive.profile.schema import FaultHelp
-
     from ..documents.parts import ResetField
 
     help_ = found.hint if isinstance(found.hint, FaultHelp) else None

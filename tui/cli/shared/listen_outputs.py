@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol, TypedDict, overload
 
-from .output import iso_time, print_json
+from .output import iso_time, plain_number, print_json
 from .rows import Column, row_text
 from .say import say
 
@@ -144,7 +144,6 @@ def exchange_document(
 def heard_value_field(value: ObservedValue) -> HeardValueField:
     """One value; that of a name or a bit word is its raw number."""
     from ..documents.listening_documents import HeardValueField
-    from .output import plain_number
 
     number = value.value.number
     return HeardValueField(

@@ -6,13 +6,15 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
-from tui.drive.blocks.assignment import no_blocks
+from tui.drive.blocks.assignment import MappingError, no_blocks
 from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, word_named
 from tui.drive.errors import DriveError
+from tui.drive.small_file import read_small_text
 from tui.session.blocks.editor import BlockEditor
+from tui.session.paths import state_folder
 
 from ..command.arming import ArmingKeys
-from ..dialogs.ask import fault_of_new
+from ..dialogs.ask import Ask, fault_of_new
 
 
 class BlockKeys(ArmingKeys):
@@ -37,8 +39,6 @@ class BlockKeys(ArmingKeys):
 
     def action_exchange(self) -> None:
         """Write values through the outputs."""
-        from ..dialogs.ask import Ask
-
         block_editor = self.block_editor
         if not self._require_armed():
             return
@@ -78,8 +78,6 @@ class BlockKeys(ArmingKeys):
 
     def action_save_file(self) -> None:
         """Ask for a file, and save the assignment with its staged changes."""
-        from ..dialogs.ask import Ask
-
         plans = self.block_editor.proposals.assignments
         if not plans:
             self._refuse("Nothing to save: no slot has been read yet.")
@@ -107,8 +105,6 @@ class BlockKeys(ArmingKeys):
 
     def action_load_file(self) -> None:
         """Choose a file, and stage its assignment."""
-        from tui.session.paths import state_folder
-
         from ..dialogs.pick_file import PickFile
 
         if not self.block_editor.proposals.blocks:
@@ -123,9 +119,7 @@ class BlockKeys(ArmingKeys):
         self.app.push_screen(PickFile(question, [], [Path.cwd(), state_folder()]), given)
 
     def _load(self, path: Path) -> None:
-        from tui.drive.blocks.assignment import MappingError
         from tui.drive.blocks.file import load_blocks
-        from tui.drive.small_file import read_small_text
 
         try:
             text = read_small_text(path)
@@ -138,8 +132,6 @@ class BlockKeys(ArmingKeys):
 
     def action_words(self) -> None:
         """Choose the four user words."""
-        from ..dialogs.ask import Ask
-
         profile = self.session.profile
 
         def wrong(text: str) -> str:

@@ -16,8 +16,11 @@ from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
 from tui.drive.fault_reset import no_fault, reset_codes, reset_follows
+from tui.drive.hints import advice_now, codes_to_read
 from tui.drive.orders import OrderRefused, chart_in_force
 from tui.drive.profile.schema import CommandOption, FaultCode, OrderId
+from tui.session.command.reference import no_place
+from tui.session.starts.record import StartNotRecorded, StartOvertaken
 from tui.session.work import Outcome
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
@@ -146,8 +149,6 @@ class OrderKeys(TeachKeys):
 
     def ask_unrecorded(self) -> None:
         """Ask once to run although the start cannot be recorded."""
-        from tui.session.starts.record import StartNotRecorded, StartOvertaken
-
         outcome, starts = self.commander.outcome, self.session.starts
         if outcome is None or outcome is self._requested or starts is None:
             return
@@ -205,8 +206,6 @@ class OrderKeys(TeachKeys):
 
         Raises LineError.
         """
-        from tui.drive.hints import advice_now, codes_to_read
-
         profile = self.session.profile
         # away from the loop: the help is read from its file
         guide = await asyncio.to_thread(lambda: profile.guide)
@@ -278,8 +277,6 @@ class OrderKeys(TeachKeys):
 
     def action_reference_by(self) -> None:
         """Ask, then set the reference through a learned preset, or end that."""
-        from tui.session.command.reference import no_place
-
         if code := self.teacher.reference:
             self.ask_no_reference(code)
         elif code := self.teacher.proposal():

@@ -17,6 +17,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.shown import shown
 from tui.drive.taught_profile import teachable_codes, why_not_taught
 from tui.drive.teaching import parse_display
+from tui.session.teaching.teacher import Teacher, reference_asks
 from tui.session.work import OutcomeKind
 from tui.widgets.drawing import fitted_names
 from tui.widgets.palette import FAINT, PLAIN, STRONG
@@ -27,7 +28,6 @@ from .arming import ArmingKeys
 
 if TYPE_CHECKING:
     from tui.session.console import DriveConsole
-    from tui.session.teaching.teacher import Teacher
 
     from ..dialogs.now import MotorStates
 
@@ -85,7 +85,6 @@ class TeachKeys(ArmingKeys):
 
     def ask_reference(self, code: str, *, by_itself: bool = False) -> None:
         """Ask to set the reference through a parameter with a learned scale."""
-        from tui.session.teaching.teacher import reference_asks
 
         def confirm(_stamp: int) -> None:
             self.run_worker(self._settle(lambda: self.teacher.confirm_reference(code)))

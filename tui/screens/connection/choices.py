@@ -13,6 +13,7 @@ from rich.text import Text
 from tui.bus.errors import LinkSyntaxError
 from tui.drive.plain import plain
 from tui.drive.profile.library import demo_drives
+from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
 from tui.session.connect.named_lines import LineSettings, line_named
 from tui.session.connect.open_line import check_line
 from tui.session.connect.port_settings import PortSettings, last_settings, port_of
@@ -160,7 +161,6 @@ def same_line(item: str, other: str) -> bool:
     if item == other:
         return True
     from tui.bus.link import SerialLink, parse_link
-    from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
 
     if len({text.casefold().startswith(SIMULATED_PREFIX) for text in (item, other)}) > 1:
         return False  # before line_key, which would import the simulator

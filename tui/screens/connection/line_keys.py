@@ -10,7 +10,10 @@ from textual.worker import WorkerError, get_current_worker
 
 from tui.bus.errors import LineError, LinkSyntaxError
 from tui.drive.errors import DriveError
+from tui.session.connect.addresses import addresses_text
+from tui.session.connect.line_key import line_key
 from tui.session.connect.named_lines import line_named
+from tui.session.paths import address_text
 
 from ..open_lines import PanelLine
 from ..opening import leave_opening
@@ -219,10 +222,6 @@ class LineKeys(Scanning):
 
         Without any, return the addresses of a simulated line, else the default.
         """
-        from tui.session.connect.addresses import addresses_text
-        from tui.session.connect.line_key import line_key
-        from tui.session.paths import address_text
-
         opened = self.app.opened
         known = addresses_text(opened.devices) if opened else ""
         return address_text(line_key(self.app.line_text)) or known or ADDRESSES

@@ -9,6 +9,7 @@ from textual.events import Resize
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
+from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
 from tui.session.connect.named_lines import line_settings
 from tui.session.connect.port_settings import port_of
 from tui.session.paths import recent_lines
@@ -100,9 +101,9 @@ class LineList(OptionList):
 
     def fill(self, shown: str, opened: Sequence[str], faulty: Sequence[str] = ()) -> None:
         """Draw the list, with marks for lines open, shown, in fault; the cursor stays."""
-        self._faulty = frozenset(_key(text) for text in faulty)
-        self._here = _key(shown) if shown else ""
-        self._open = frozenset(_key(text) for text in opened if text)
+        self._faulty = frozenset(line_key(text) for text in faulty)
+        self._here = line_key(shown) if shown else ""
+        self._open = frozenset(line_key(text) for text in opened if text)
         self._fill()
 
     def on_resize(self, event: Resize) -> None:
@@ -131,7 +132,7 @@ class LineList(OptionList):
         for choice in group.choices:
             key = f"{group.title} {choice.name} {choice.text}"
             self._choices[key] = choice
-            line = _key(choice.text) if self._may_be_open(choice.text) else ""
+            line = line_key(choice.text) if self._may_be_open(choice.text) else ""
             found.append(entry(choice_line(choice, width, self._mark(line)), id=key))
         if group.empty and (not group.choices or group.title == "Named"):
             found.append(entry(Text(short(f"  {group.empty}", width), FAINT), disabled=True))
@@ -151,8 +152,6 @@ class LineList(OptionList):
         """
         if not self._open:
             return False
-        from tui.session.connect.line_key import SIMULATED_PREFIX
-
         simulated = text.casefold().startswith(SIMULATED_PREFIX)
         return any(line.startswith(SIMULATED_PREFIX) is simulated for line in self._open)
 
@@ -160,10 +159,3 @@ class LineList(OptionList):
 def list_width(width: int) -> int:
     """Return the columns that the style sheet gives the list on a terminal of `width` columns."""
     return max(22, min(32, width * 32 // 100))
-
-
-def _key(text: str) -> str:
-    """Return the key of a line; called only while a line is open, as the import is slow before."""
-    from tui.session.connect.line_key import line_key
-
-    return line_key(text)

@@ -13,6 +13,11 @@ from textual.widgets import Input
 
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
+from tui.drive.profile import library
+from tui.session.connect.addresses import addresses_text
+from tui.session.connect.line_key import line_key
+from tui.session.connect.named_lines import profile_named
+from tui.session.paths import remember_addresses
 
 from ..app_port import tell_unreached
 from .advice import ALARM_KIND
@@ -184,8 +189,6 @@ class Scanning(LineView):
 
     def sum_up(self, devices: Sequence[int]) -> None:
         """Report the result of a finished scan."""
-        from tui.session.connect.addresses import addresses_text
-
         if not self.found and self.search is not None and self.search.answered:
             return  # `_take` has reported each answer
         if not self.found:
@@ -235,7 +238,6 @@ class Scanning(LineView):
 
         Without a profile, or if loading it fails, add only the identity.
         """
-        from tui.drive.profile import library
         from tui.session.drive import DriveSession
 
         typed = self.form.profile
@@ -297,8 +299,6 @@ class Scanning(LineView):
             await self._equip(drive.identity)
             drive = self.found.get(device)
         if drive is None or drive.console is None:
-            from tui.drive.profile import library
-
             known = ", ".join(listing.id for listing in library.listings())
             self.say(
                 f"Device {device} does not identify itself.",
@@ -352,15 +352,9 @@ def _families() -> str:
 
 def _named(line: str, device: int) -> str | None:
     """Return the profile that the settings file names for a drive, if any; reads files."""
-    from tui.session.connect.line_key import line_key
-    from tui.session.connect.named_lines import profile_named
-
     return profile_named(line_key(line), device)
 
 
 def _remember(line: str, addresses: str) -> None:
     """Store the addresses of a line for the next time it is opened; writes a file."""
-    from tui.session.connect.line_key import line_key
-    from tui.session.paths import remember_addresses
-
     remember_addresses(line_key(line), addresses)

@@ -15,6 +15,8 @@ from textual.widgets import Input, OptionList
 from textual.worker import WorkerError, get_current_worker
 
 from tui.bus.errors import LineError, LinkSyntaxError, PortRefused
+from tui.session.connect.addresses import addresses_text
+from tui.session.paths import remember_line
 
 from ..dialogs.why_target import WhyTarget
 from ..keys.action import CONNECTION
@@ -67,8 +69,6 @@ class OtherSettings(LineKeys):
 
     def _who_is_unclear(self) -> str:
         """Warn of devices that answered without a valid identification; empty if there are none."""
-        from tui.session.connect.addresses import addresses_text
-
         answered = self.search.answered if self.search is not None else frozenset()
         if not answered:
             return ""
@@ -174,7 +174,6 @@ class OtherSettings(LineKeys):
     def _stay_at(self, text: str, setting: LineSetting) -> None:
         """Keep the line at the setting at which a device answered, and store it as recent."""
         from tui.session.connect.known_lines import remembered_text
-        from tui.session.paths import remember_line
 
         self.form.show_settings(setting.baud, setting.format)
         answer = DRIVES_ANSWER if self.found.keys() - self.unclear else DAMAGED_ANSWERS

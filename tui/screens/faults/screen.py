@@ -25,7 +25,7 @@ from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 
 from ..command.command_keys import OrderKeys
-from ..dialogs.ask import fault_of_new
+from ..dialogs.ask import Ask, fault_of_new
 from ..keys.action import FAULTS
 from ..keys.table import bindings
 from .doctor import doctor_lines
@@ -317,8 +317,6 @@ class FaultsScreen(OrderKeys):
 
     def action_save_file(self) -> None:
         """Prompt for a file name and save the latest record as Markdown."""
-        from ..dialogs.ask import Ask
-
         record = self._recorder.latest
         if record is None:
             self.app.tell("Nothing to save: no trip since monitoring of this drive began.")

@@ -16,7 +16,7 @@ from tui.drive.profile.schema import Parameter
 from tui.drive.settings.factory import factory_is_sure, factory_raw
 from tui.drive.settings.in_force import limit_passed
 from tui.drive.shown import number_of, raw_of_text
-from tui.drive.values import hexadecimal, word_count
+from tui.drive.values import hexadecimal, is_enumeration, word_count
 from tui.session.settings.editor import Editor
 from tui.widgets.fields import NumberInput
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
@@ -275,8 +275,6 @@ def dialog_for(
 
     It begins with the `proposed` raw value, if there is one.
     """
-    from tui.drive.values import is_enumeration
-
     if parameter.bits:
         return lambda: EditBits(editor, parameter, now, proposed)
     if is_enumeration(parameter):

@@ -6,7 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rich.table import Table
 from rich.text import Text
@@ -17,21 +17,22 @@ from textual.containers import Vertical, VerticalScroll
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 from tui.drive.plain import plain
+from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
-from tui.drive.settings.restore_plan import RestoreItem
+from tui.drive.settings.parameter_set import ParameterSet, dump_set
+from tui.drive.settings.restore_plan import RestoreItem, RestorePlan
 from tui.drive.settings.selection import Choice
-from tui.drive.settings.set_file import read_set
+from tui.drive.settings.set_file import read_set, write_file
 from tui.drive.settings.writable import is_setting
+from tui.session.paths import state_folder
+from tui.session.read.upload import Upload, head_of, setting_codes
 from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
 
-from ..dialogs.ask import fault_of_new
-from ..dialogs.pick_file import FileAbout
+from ..dialogs.ask import Ask, fault_of_new
+from ..dialogs.pick_file import FileAbout, PickFile
 from ..dialogs.question import KeyQuestion, hint
 from .parameter_list import ParameterKeys
-
-if TYPE_CHECKING:
-    from tui.drive.settings.parameter_set import ParameterSet
 
 SKIPPED_KEYS = hint(("Enter or Esc", "Close"), ("Up, Down", "Scroll"))
 
@@ -127,14 +128,10 @@ class SetKeys(ParameterKeys):
             self.run_worker(work, exclusive=True, group="sets")
 
     def _set_text(self, values: ParameterSet, _path: Path) -> str:
-        from tui.drive.settings.parameter_set import dump_set
-
         return dump_set(self.session.profile, values)
 
     @property
     def _setting_codes(self) -> list[str]:
-        from tui.session.read.upload import setting_codes
-
         return setting_codes(self.session.profile)
 
     def _new_path(self, suffix: str) -> Path:
@@ -143,7 +140,6 @@ class SetKeys(ParameterKeys):
 
     def action_report(self) -> None:
         """Ask for a file, read everything, and write a report for a customer."""
-        from tui.drive.settings.set_file import write_file
         from tui.session.journal_reading import entries_of
         from tui.session.report import report_text
         from tui.session.report_page import PAGE_SUFFIXES, page_text
@@ -183,7 +179,6 @@ class SetKeys(ParameterKeys):
         codes: list[str],
     ) -> None:
         """Ask for a file, read these codes (all if empty), and write the text to it."""
-        from ..dialogs.ask import Ask
 
         def reported(name: str | None) -> None:
             if name:
@@ -197,9 +192,6 @@ class SetKeys(ParameterKeys):
     async def _read_to_file(
         self, path: Path, text: Callable[[ParameterSet, Path], str], codes: list[str]
     ) -> None:
-        from tui.drive.settings.set_file import write_file
-        from tui.session.read.upload import Upload
-
         def progress(done: int, count: int) -> None:
             self._tell_reading(f"{path.name}: {done} of {count}")
 
@@ -226,9 +218,6 @@ class SetKeys(ParameterKeys):
 
     def action_load_file(self) -> None:
         """Choose what to compare with: a file, another drive, or the factory settings."""
-        from tui.session.paths import state_folder
-
-        from ..dialogs.pick_file import PickFile
 
         def reported(text: str | None) -> None:
             if text:
@@ -287,16 +276,12 @@ class SetKeys(ParameterKeys):
             self._tell_reading("")
 
     async def _compare_file(self, name: str) -> None:
-        from tui.drive.settings.set_file import read_set
-
         path = Path(name)
         # errors name the file without its folders: a long path leaves no room for the error
         self.editor.source = await asyncio.to_thread(lambda: read_set(path.expanduser(), path.name))
         self.editor.other_label = path.name
 
     async def _compare_drive(self, device: int) -> None:
-        from tui.session.read.upload import Upload, setting_codes
-
         found = self.app.fleet.console(device) if self.app.fleet else None
         if found is None:
             return
@@ -332,9 +317,7 @@ class SetKeys(ParameterKeys):
 
         Return the sentence about the rating; empty for a set of this drive.
         """
-        from tui.drive.profile import library
         from tui.drive.settings.replacement import identity_lines, is_of_another_drive
-        from tui.session.read.upload import head_of
 
         source, session = self.editor.source, self.session
         now = head_of(session)
@@ -372,7 +355,5 @@ class SetKeys(ParameterKeys):
 
 def plan_values(plan: object) -> dict[str, int]:
     """The raw values that a plan would write, by code."""
-    from tui.drive.settings.restore_plan import RestorePlan
-
     assert isinstance(plan, RestorePlan)
     return {edit.code: edit.new for edit in plan.edits}

@@ -17,6 +17,7 @@ from tui.drive.plain import plain
 from tui.drive.sentences import first_of
 from tui.drive.settings.edits import Edit, Edits, consequences
 from tui.drive.settings.limits import edit_problems
+from tui.drive.settings.memory_orders import factory_order, save_effect
 from tui.drive.settings.writable import cuts_line
 from tui.drive.settings.write_sequence import ordered
 from tui.drive.values import NOT_AVAILABLE
@@ -207,15 +208,11 @@ class WriteKeys(ParameterKeys):
 
     def action_save_eeprom(self) -> None:
         """Ask, then save the settings to EEPROM."""
-        from tui.drive.settings.memory_orders import save_effect
-
         unsaved = self.editor.unsaved
         self._memory("Save to EEPROM?", lambda p: save_effect(p, unsaved), "Save", self.editor.save)
 
     def action_factory(self) -> None:
         """Ask, then restore the factory settings."""
-        from tui.drive.settings.memory_orders import factory_order
-
         question = "Restore the factory settings?"
         self._memory(
             question, lambda profile: factory_order(profile).does, "Restore", self.editor.factory

@@ -13,6 +13,8 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
+import msgspec
+
 import tui
 from tui.bus.link import Link, SerialLink, label
 from tui.bus.transport.port_names import lasting_name
@@ -93,8 +95,6 @@ def _line_file(subject: BundleSubject) -> PartFile:
 
 
 def _open_line(subject: BundleSubject) -> dict[str, Any]:
-    import msgspec
-
     assert subject.opened is not None
     line = subject.opened.line
     known = subject.opened.known

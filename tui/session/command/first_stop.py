@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import DeviceException, ExchangeError, LineError, NoAnswer
 from tui.bus.limits import Limits
+from tui.bus.link import label
 from tui.drive.first_stop import FirstWord, StopPlace, first_word, followers, stop_places
 from tui.drive.orders import stop_alike
 from tui.drive.profile import library
@@ -207,8 +208,6 @@ async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord
 
 
 def _entry(line: ModbusLine, device: int, what: FirstWord, answer: str) -> Entry:
-    from tui.bus.link import label
-
     return Entry(
         time=now_text(),
         line=label(line.link),

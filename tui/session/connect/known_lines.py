@@ -13,7 +13,8 @@ from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from tui.bus.link import Link, SerialLink, label
+from tui.bus.errors import LinkSyntaxError
+from tui.bus.link import Link, SerialLink, label, parse_link
 from tui.bus.transport.port_names import PortName, lasting_name
 from tui.drive.profile.library import version_shown
 from tui.drive.small_file import read_small_text
@@ -105,9 +106,6 @@ def line_name(link: Link) -> LineName:
 
 def remembered_text(text: str) -> str:
     """Stored form of a LINE: a port by its permanent name if its adapter has one."""
-    from tui.bus.errors import LinkSyntaxError
-    from tui.bus.link import parse_link
-
     try:
         link = parse_link(text)
     except LinkSyntaxError:

@@ -16,12 +16,13 @@ from typing import Any
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
+from tui.drive.profile import library
 from tui.drive.profile.schema import StateKind
 from tui.drive.sentences import first_of
 from tui.drive.settings.edits import Edit
 from tui.drive.settings.memory_orders import eeprom_use
 from tui.drive.settings.parameter_set import ParameterSet
-from tui.drive.settings.restore_plan import RestorePlan
+from tui.drive.settings.restore_plan import Options, RestorePlan
 from tui.drive.settings.selection import FilterContext
 from tui.drive.settings.writable import Refusal, write_refusal
 
@@ -166,8 +167,6 @@ class Editor:
 
     async def plan(self) -> RestorePlan:
         """Read the drive, and plan the writes for the set. Raises the line's errors."""
-        from tui.drive.profile import library
-        from tui.drive.settings.restore_plan import Options
         from tui.drive.settings.restore_planner import plan_restore
 
         from .restore import held_by

@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+import msgspec
+
 from tui.drive.small_file import read_small, sync_folder
 
 from ..connect.share_place import group_folder
@@ -49,8 +51,6 @@ class StartFiles:
 
         Raises OSError; an older record of the same start then remains unchanged.
         """
-        import msgspec
-
         self._make_folder()
         path = self.folder / _name(record)
         part = path.with_suffix(".part")
@@ -127,8 +127,6 @@ def _name(record: StartRecord) -> str:
 
 
 def _read(path: Path) -> StartRecord | None:
-    import msgspec
-
     try:
         return msgspec.json.decode(read_small(path, LONGEST_RECORD), type=StartRecord)
     except FileNotFoundError:
