@@ -19,8 +19,8 @@ from textual.events import Resize
 from textual.screen import ModalScreen
 from textual.worker import Worker, WorkerState
 
-from tui.bus.errors import LinkSyntaxError
-from tui.bus.link import parse_link
+from tui.bus.errors import LineError, LinkSyntaxError
+from tui.bus.link import Link, parse_link
 from tui.drive.errors import DriveError
 from tui.session.paths import state_folder
 from tui.terminal.lean import screen_text
@@ -34,8 +34,6 @@ from .dialogs.question import hint
 from .frame import Framed
 
 if TYPE_CHECKING:
-    from tui.bus.errors import LineError
-    from tui.bus.link import Link
     from tui.drive.profile.profile import Profile
     from tui.session.bundle.parts import PartProgress
     from tui.session.bundle.subject import BundleSubject

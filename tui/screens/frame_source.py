@@ -11,7 +11,7 @@ from rich.style import Style
 
 from tui.drive.sentences import counted
 from tui.safety import LOOK_IS_OLD
-from tui.session.command.stop_report import NOT_STOPPED
+from tui.session.command.stop_report import NOT_STOPPED, StopReport
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, age_text
 from tui.widgets.replay_bar import ReplayView
 from tui.widgets.strip import BarMessage, DriveNow, FrameView, StripView
@@ -21,7 +21,6 @@ from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
 from .state_words import state_cell, value_cell
 
 if TYPE_CHECKING:
-    from tui.session.command.stop_report import StopReport
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession

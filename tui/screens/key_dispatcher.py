@@ -15,7 +15,7 @@ from tui.session.carry_on import carried_on
 from tui.terminal.fields import takes_space, takes_text
 from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
-from tui.terminal.stroke import stroke_of
+from tui.terminal.stroke import Stroke, stroke_of
 from tui.widgets.replay_bar import NO_MOTOR
 from tui.widgets.small import is_too_small
 
@@ -32,7 +32,6 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
-    from tui.terminal.stroke import Stroke
 
 log = logging.getLogger(__name__)
 

@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from tui.drive.sentences import counted, sentence
-from tui.session.command.stop_report import AT_THE_MACHINE, NOT_STOPPED
+from tui.session.command.stop_report import AT_THE_MACHINE, NOT_STOPPED, StopReport
 
 if TYPE_CHECKING:
-    from tui.session.command.stop_report import StopReport
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
 

@@ -14,9 +14,11 @@ import selectors
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import lru_cache
-from typing import IO, TYPE_CHECKING, Any, Protocol, cast
+from selectors import BaseSelector
+from typing import IO, Any, Protocol, cast
 
 from textual import constants, events
 from textual._xterm_parser import XTermParser
@@ -27,11 +29,6 @@ from .loop import soon_in_loop
 from .reader import KeyReader, Stops, TerminalInput
 from .stroke import Pressed, attach
 from .tokens import Report
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-    from selectors import BaseSelector
-
 
 log = logging.getLogger(__name__)
 

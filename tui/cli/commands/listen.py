@@ -8,13 +8,13 @@ import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from tui.bus.errors import LineError
 from tui.bus.listening_line import ListeningLine
 from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
 from tui.session.capture_file import CaptureFile
 from tui.session.connect.address_prober import known_profiles
 from tui.session.listening.background import (
@@ -39,9 +39,6 @@ from ..shared.registration import command
 from ..shared.say import say
 from ..shared.signals import interrupted_by_signal, never_suspended
 from ..shared.standard_streams import STANDARD
-
-if TYPE_CHECKING:
-    from tui.drive.profile.profile import Profile
 
 PROGRAM_NAME = "listen"
 LAST_ADDRESS_HEARD = 255

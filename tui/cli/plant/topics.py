@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from typing import TYPE_CHECKING, Literal
 
-from tui.bus.api import Contact
+from tui.bus.api import Contact, LineCounters, LineState
 
 from ..documents.document import DocumentPart, TimeoutField
 from ..documents.drive_documents import CycleTime
@@ -21,8 +21,6 @@ from ..shared.watch_outputs import cycle_document
 from .broker import level
 
 if TYPE_CHECKING:
-    from tui.bus.api import LineCounters, LineState
-
     from .status import DriveStatus, LineReport
 
 ONLINE, OFFLINE = "online", "offline"

@@ -6,11 +6,10 @@ import asyncio
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from tui.session.monitor.snapshot import as_read
+from tui.session.monitor.snapshot import Snapshot, as_read
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.monitor.snapshot import Snapshot
 
 SNAPSHOTS_WAITING = 64
 """Snapshots kept for an output that is slower than the line; older ones are dropped."""

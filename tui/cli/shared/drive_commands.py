@@ -11,7 +11,7 @@ import click
 
 from tui.drive.orders import OrderRefused
 from tui.drive.sentences import counted
-from tui.session.work import Outcome, OutcomeKind
+from tui.session.work import Outcome, OutcomeKind, Permit
 
 from .errors import REFUSED_HERE, Failure, note_journal, status_of
 from .options import Target, connect_drive
@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
     from tui.session.starts.keeper import StartKeeper
-    from tui.session.work import Permit
 
 arm_option = click.option(
     "--arm", is_flag=True, help="Arm the drive for this command. Required for writing."

@@ -5,11 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from datetime import datetime
-from typing import TYPE_CHECKING
 
 from tui.drive.model import model_read
 from tui.drive.settings.writable import AT_REST
 from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
+from tui.session.journal import Entry
 from tui.session.shown import Quality, Shown
 from tui.session.startup.evidence import SeenStop, SteadyRun, last_run, last_steady, last_stop
 from tui.session.startup.judging import (
@@ -25,10 +26,6 @@ from tui.session.startup.start_up import StartUp
 
 from ..base import PanelScreen
 from ..keys.action import MONITOR, SOURCES
-
-if TYPE_CHECKING:
-    from tui.session.drive import DriveSession
-    from tui.session.journal import Entry
 
 STOPPED_BY = "stopped: "
 """Begin of the reason of a stop in the journal."""

@@ -11,7 +11,7 @@ from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
 from ..patience import patience
-from ..work import OutcomeKind
+from ..work import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
     from ..command.commander import Commander
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from ..fleet import Fleet
     from ..monitor.snapshot import Snapshot
     from ..timeout_report import TimeoutWatch
-    from ..work import Outcome
 
 COMMAND_POLL_INTERVAL = 0.02
 """Seconds between two checks of the work in the line's thread."""

@@ -12,12 +12,13 @@ import threading
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from tui.bus.api import LineStatus, LineWorker, ModbusLine
 from tui.bus.errors import LineClosed
 from tui.bus.line_events import LineEvent, ProgramLost, StopDue
 from tui.bus.link import label
+from tui.bus.program import Program
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.safety import LINE_BACK_WITHIN, LONGEST_GRACE, SILENT_CLIENT, TAKEN_OVER_WITHIN
@@ -27,16 +28,12 @@ from ..command.stop import Stopper
 from ..command.stop_report import Phase, message_text
 from ..connect.line_key import line_key
 from ..drive import DriveSession
+from ..events import EventLog
 from ..journal import Journal
 from ..starts.keeper import pids_absent
 from ..starts.record import StartRecord
 from ..starts.starts import Starts
 from .care import DrivesInCare
-
-if TYPE_CHECKING:
-    from tui.bus.program import Program
-
-    from ..events import EventLog
 
 log = logging.getLogger(__name__)
 

@@ -9,11 +9,10 @@ from typing import TYPE_CHECKING, Literal
 from tui.bus.program import pid_namespace
 
 if TYPE_CHECKING:
-    from tui.bus.program import ProcessKey
-
     from ..connect.identify import DriveIdentity
 from pathlib import Path
 
+from tui.bus.program import ProcessKey
 from tui.drive.errors import DriveError
 
 

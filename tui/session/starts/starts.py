@@ -28,10 +28,10 @@ from .processes import Processes
 from .record import OVERTAKEN, StartNotRecorded, StartOvertaken, StartRecord
 
 if TYPE_CHECKING:
-    from tui.bus.program import ProcessKey
-
     from ..connect.identify import DriveIdentity
 from dataclasses import dataclass, field
+
+from tui.bus.program import ProcessKey
 
 log = logging.getLogger(__name__)
 

@@ -15,7 +15,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from tui.drive.errors import DriveError, ValueRefused, ValueUndetermined
 from tui.drive.profile.profile import Profile
@@ -32,15 +31,12 @@ from tui.drive.teaching import (
     taught_by,
 )
 
+from ..connect.identify import DriveIdentity
 from ..connect.line_key import line_key
 from ..drive import DriveSession
 from ..paths import state_folder
 from ..read.reader import Reader
 from ..stored import make_folder
-
-if TYPE_CHECKING:
-    from ..connect.identify import DriveIdentity
-
 
 LONGEST = 200_000
 """Most bytes of such a file; a longer one is not read."""
