@@ -6,7 +6,6 @@ import itertools
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
-from types import TracebackType
 
 from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile
@@ -78,12 +77,7 @@ class Simulation:
         self.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def start(self) -> None:

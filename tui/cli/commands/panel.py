@@ -17,7 +17,7 @@ from ..shared.registration import command
 
 
 def run_panel(start: str | None, device: int | None, **how: Any) -> None:
-    """Run the panel until it is left; `how` as for `open_panel`."""
+    """Run the panel until it is left; `how` are the options, as for `open_panel`."""
     if trouble := terminal_trouble():
         raise Failure(trouble, USAGE)
     if status := open_panel(start, device, **how):
@@ -58,17 +58,9 @@ ascii_option = click.option(
 @mouse_option
 @bell_option
 @ascii_option
-def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bool | None) -> None:
+def demo(**how: Any) -> None:
     """Open the panel on one simulated line with five running drives."""
-    run_panel(
-        DEMO_LINE,
-        None,
-        low_bandwidth=low_bandwidth,
-        on_hangup=on_hangup,
-        mouse=mouse,
-        bell=bell,
-        ascii=ascii,
-    )
+    run_panel(DEMO_LINE, None, **how)
 
 
 def _as_used_last(line_text: str) -> str:
@@ -105,16 +97,7 @@ def _as_used_last(line_text: str) -> str:
 @mouse_option
 @bell_option
 @ascii_option
-def panel(
-    line_text: str | None,
-    device: int | None,
-    read_only: bool,
-    low_bandwidth: bool,
-    on_hangup: str,
-    mouse: bool,
-    bell: bool,
-    ascii: bool | None,
-) -> None:
+def panel(line_text: str | None, device: int | None, **how: Any) -> None:
     """Open the panel."""
     if device is not None and line_text is None:
         raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
@@ -122,13 +105,4 @@ def panel(
         from ..main import no_such_command
 
         raise click.UsageError(no_such_command(line_text))
-    run_panel(
-        None if line_text is None else _as_used_last(line_text),
-        device,
-        read_only=read_only,
-        low_bandwidth=low_bandwidth,
-        on_hangup=on_hangup,
-        mouse=mouse,
-        bell=bell,
-        ascii=ascii,
-    )
+    run_panel(None if line_text is None else _as_used_last(line_text), device, **how)

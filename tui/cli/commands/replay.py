@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -30,15 +31,7 @@ from .panel import ascii_option, bell_option, low_bandwidth_option, mouse_option
 @mouse_option
 @bell_option
 @ascii_option
-def replay(
-    source: str,
-    at: str | None,
-    device: int | None,
-    low_bandwidth: bool,
-    mouse: bool,
-    bell: bool,
-    ascii: bool | None,
-) -> None:
+def replay(source: str, at: str | None, device: int | None, **how: Any) -> None:
     """Show a record of a line, or of `drivepanel record`, as the panel showed the drives then.
 
     A FOLDER with the files of one line, or a LINE of this computer, is shown over all its days.
@@ -62,11 +55,4 @@ def replay(
     if device is not None and device not in line.devices:
         known = ", ".join(map(str, line.devices)) or "none"
         raise Failure(f"Drive {device} is not in the record. Its drives: {known}.", USAGE)
-    run_panel(
-        text,
-        device,
-        low_bandwidth=low_bandwidth,
-        mouse=mouse,
-        bell=bell,
-        ascii=ascii,
-    )
+    run_panel(text, device, **how)

@@ -8,7 +8,7 @@ import signal
 import threading
 import time
 from contextlib import ExitStack, suppress
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Self
 
 from tui.drive.chart import Direction
@@ -79,12 +79,7 @@ class RunningMotor(GuardedMotor):
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, _: object, error: BaseException | None, __: object) -> None:
         self._leave(error)
 
     def _leave(self, error: BaseException | None) -> None:
@@ -133,12 +128,7 @@ class AsyncRunningMotor(GuardedMotor):
             raise
         return self
 
-    async def __aexit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    async def __aexit__(self, _: object, error: BaseException | None, __: object) -> None:
         await self._leave(error)
 
     async def _leave(self, error: BaseException | None) -> None:
