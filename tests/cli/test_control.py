@@ -91,9 +91,14 @@ def test_unproved_profile_writes_only_if_a_person_confirms_it(
         questions.append(question)
         return answer
 
-    monkeypatch.setattr("tui.cli.shared.options.may_ask", lambda: True)
-    monkeypatch.setattr("tui.cli.shared.options.says_yes", answered)
-    result = invoked("write", "sim:ms300", "-p", "ms300", "01-00=50", "--arm")
+    monkeypatch.setattr("tui.cli.shared.profile_choice.may_ask", lambda: True)
+    monkeypatch.setattr("tui.cli.shared.profile_choice.says_yes", answered)
+    with tcp_line("ms300@1") as line:
+        result = invoked("write", line, "-p", "ms300", "01-00=50", "--arm")
     assert result.exit_code == status, result.stderr
     (question,) = questions
     assert question.endswith("Write to device 1?")
+
+
+def test_simulated_drive_of_an_unproved_profile_is_armed_without_a_question() -> None:
+    run(0, "write", "sim:ms300", "01-00=50", "--arm")

@@ -102,3 +102,34 @@ def test_pairs_and_parts_of_words_are_valid_from_the_first_moment(tmp_path: Path
     ended(0, "profiles", "new", "pairs", "--from-csv", table)
     assert library.faults_of(library.user_folder() / "pairs.toml") == []
     assert library.load("pairs").parameters[1].shift == 8
+
+
+def test_rule_for_addresses_is_written_once(tmp_path: Path) -> None:
+    table = tmp_path / "t.csv"
+    table.write_text(
+        "code,name,number,address,type\nA,Ramp,3-41,,uint32\nB,Top,3-03,,\nC,Word,1,7,\n", "utf-8"
+    )
+    new = ("profiles", "new", "own", "--from-csv", table)
+    ended(0, *new, "--address-rule", "10 * number - 1")
+    path = library.user_folder() / "own.toml"
+    rows = {p.code: p.address for p in library.load_file(path).parameters}
+    assert rows == {"A": 3409, "B": 3029, "C": 7}
+    text = path.read_text("utf-8")
+    assert text.count("\naddress = ") == 2
+    assert "\n# low_word_first = false\n" in text
+    assert library.faults_of(path) == []
+    refused = ended(2, *new[:2], "own2", *new[3:], "--address-rule", "number - 1000")
+    assert "t.csv: A: 'number - 1000' gives -659 for 3-41" in refused.stderr
+
+
+def test_missing_addresses_are_reported_once_with_the_rule(tmp_path: Path) -> None:
+    table = tmp_path / "t.csv"
+    table.write_text("code,name\nA,Ramp\nB,Top\nC,Word\n", "utf-8")
+    ended(0, "profiles", "new", "own", "--from-csv", table)
+    path = library.user_folder() / "own.toml"
+    line = path.read_text("utf-8").splitlines().index("[[parameters]]") + 1
+    assert library.faults_of(path) == [
+        f"{path}:{line}: parameters.#1 (A): the field `address` is missing in 3 rows. Give"
+        " each a number from 0 to 65535, or one rule for all as address of [profile], such as"
+        " '10 * number - 1'."
+    ]

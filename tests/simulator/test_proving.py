@@ -97,8 +97,13 @@ def test_wrong_reference_fails(tmp_path: Path, name: str) -> None:
     assert text.count(right) == 1
     path = tmp_path / "own.toml"
     path.write_text(text.replace(right, wrong), "utf-8")
-    [title] = failed(library.load_file(path))
+    [(title, fault)] = failed(library.load_file(path)).items()
     assert title.startswith("FREQCMD and")
+    if "feedback =" in wrong:
+        assert (
+            "FMAX is max_frequency, which does not follow the motor. Give it frequency_reference"
+            in fault
+        )
 
 
 def test_reset_that_has_no_effect_fails(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -124,7 +124,11 @@ class DriveSession:
         self.arming.barred = text if self.is_unconfirmed else ""
 
     def confirm_profile(self) -> None:
-        """Allow arming although the profile is unproved: a person has confirmed it."""
+        """Allow arming although the profile is unproved.
+
+        A person has confirmed it, or this process itself simulates the motor. A simulated drive of
+        another process looks like a real one.
+        """
         self.is_unconfirmed = False
         self.bar_unconfirmed()
 

@@ -89,7 +89,7 @@ PARAMETER_COLUMNS = (
     "rules",
     multiple=True,
     metavar="RULE",
-    help="Use this rule for addresses; for --from-eds.",
+    help="Use this rule for addresses; for --from-csv, --from-eds.",
 )
 @click.option(
     "-d",

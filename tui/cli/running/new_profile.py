@@ -34,8 +34,8 @@ def begin_profile(
     from ..documents.other_documents import ProfileBegun
     from ..shared.output import print_json
 
-    if rules and sheet is None:
-        raise click.UsageError("--address-rule is for --from-eds.")
+    if rules and sheet is None and (table is None or len(rules) > 1):
+        raise click.UsageError("--address-rule is for --from-eds, and once for --from-csv.")
     given = [given_file(path) for path in (table, sheet) if path is not None]
     if len(words) != 1 or len(given) + (origin is not None) != 1:
         raise click.UsageError(
@@ -49,7 +49,9 @@ def begin_profile(
     if sheet is not None:
         text = _from_eds(given[0], new_id, rules)
     else:
-        text = _from_table(given[0], new_id) if given else _copied(known, origin or "", new_id)
+        text = (
+            _from_table(given[0], new_id, rules) if given else _copied(known, origin or "", new_id)
+        )
     start = origin.strip().lower() if origin is not None else str(given[0])
     path = library.user_folder() / f"{new_id}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -81,7 +83,7 @@ def _copied(known: Mapping[str, Listing], origin: str, new_id: str) -> str:
     return new_profile_text(read_small_text(source.path), source.id, new_id, rows)
 
 
-def _from_table(table: Path, new_id: str) -> str:
+def _from_table(table: Path, new_id: str, rules: tuple[str, ...]) -> str:
     """Return the text of a profile with the rows of a table; a byte order mark is ignored."""
     from tui.drive.profile.csv_file import profile_from_table
     from tui.drive.small_file import encoding_fault, read_small
@@ -92,7 +94,7 @@ def _from_table(table: Path, new_id: str) -> str:
         raise Failure(f"{table}: cannot be read: {error.strerror}.", USAGE) from error
     if fault := encoding_fault(data):
         raise Failure(f"{table}:{fault}", USAGE)
-    return profile_from_table(data.decode("utf-8"), new_id, str(table))
+    return profile_from_table(data.decode("utf-8"), new_id, str(table), "".join(rules))
 
 
 def _from_eds(sheet: Path, new_id: str, rules: tuple[str, ...]) -> str:

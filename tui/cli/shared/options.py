@@ -291,6 +291,8 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     session = DriveSession(opened.line, target.device, profile, reported)
     if session.contradiction:
         believe_the_person(session, target)
+    if opened.simulation is not None and session.is_unconfirmed and not session.contradiction:
+        session.confirm_profile()
     await confirm_unproved(session)
     mind_the_drive(opened, target.device, reported, "" if session.contradiction else profile.id)
     await _check_byte_order(session)

@@ -82,7 +82,7 @@ def _faults_of_form(sources: ProfileTables, rules: Rules) -> list[ProfileFault]:
     form, mended = form_faults(sources.tables)
     reported = [
         (path, f"{place_label(sources.tables, path)}: {sentence(text)}")
-        for path, text in form.found
+        for path, text in _missing_addresses_once(form.found)
     ]
     try:
         data: ProfileData = converted(mended, ProfileData)
@@ -92,6 +92,23 @@ def _faults_of_form(sources: ProfileTables, rules: Rules) -> list[ProfileFault]:
         broken = _broken_rules(data, rules)
         reported += [rule for rule in broken if not _invented(rule[0], form.invented)]
     return _in_order(_placed(sources, reported))
+
+
+NO_ADDRESS = "the field `address` is missing"
+
+
+def _missing_addresses_once(found: list[tuple[TomlPath, str]]) -> Iterator[tuple[TomlPath, str]]:
+    """Yield faults of form, with one for all parameters without an address."""
+    lacking = [item for item in found if item[0][:1] == ("parameters",) and NO_ADDRESS in item[1]]
+    for path, text in found:
+        if len(lacking) < 2 or (path, text) not in lacking:
+            yield path, text
+        elif path == lacking[0][0]:
+            yield (
+                path,
+                f"{NO_ADDRESS} in {len(lacking)} rows. Give each a number from 0 to 65535, or one"
+                " rule for all as address of [profile], such as '10 * number - 1'",
+            )
 
 
 def _invented(path: TomlPath, invented: list[TomlPath]) -> bool:

@@ -16,6 +16,7 @@ from typing import Any
 
 from ..errors import ProfileError
 from ..plain import escaped_toml
+from .address_rule import RuleError, address_by_rule
 from .new_file import IDENTIFIER, row_as_toml
 
 COLUMNS: Mapping[str, str] = {
@@ -43,7 +44,7 @@ id = "{id}"
 name = "{id}"
 vendor = "Unknown"
 version = "0.1"
-# address = "10 * number - 1"
+{address}
 
 [[sources]]
 id = "table"
@@ -78,14 +79,28 @@ name = "{name}"
 {limit} = 2
 """
 _FURTHER = {1: "Read coils", 2: "Read discrete inputs", 4: "Read input registers"}
+PAIRS = """
+# Which of the two words of a long value is first: an example frame of the manual shows it.
+[reading]
+# low_word_first = false
+"""
 
 
-def profile_from_table(text: str, new_id: str, file: str) -> str:
-    """Return a profile with a row for each line of a table. Raises ProfileError."""
+def profile_from_table(text: str, new_id: str, file: str, rule: str = "") -> str:
+    """Return a profile with a row for each line of a table. Raises ProfileError.
+
+    `rule` gives the addresses of the rows without one, over the number of the manual.
+    """
     rows = list(_rows(text, file))
     if not rows:
         raise ProfileError(f"{file}: it has no line with a parameter.")
-    return _profile_of(rows, new_id)
+    for row in rows if rule else ():
+        if "address" not in row:
+            try:
+                address_by_rule(rule, row["number"])
+            except RuleError as error:
+                raise ProfileError(f"{file}: {row['code']}: {error}") from None
+    return _profile_of(rows, new_id, rule)
 
 
 def profile_of_rows(cells: Iterable[dict[str, str]], new_id: str) -> str:
@@ -96,12 +111,12 @@ def profile_of_rows(cells: Iterable[dict[str, str]], new_id: str) -> str:
         raise ProfileError(str(error)) from None
 
 
-def _profile_of(rows: list[dict[str, Any]], new_id: str) -> str:
+def _profile_of(rows: list[dict[str, Any]], new_id: str, rule: str = "") -> str:
     if not IDENTIFIER.fullmatch(new_id):
         raise ProfileError(
             f"{new_id!r} is not an id. Use small letters, digits, - and _, with a letter first."
         )
-    more, most = "", 1
+    more, most, order = "", 1, ""
     read = {row.get("function") for row in rows}
     for code, name in _FURTHER.items():
         if code in read:
@@ -110,13 +125,15 @@ def _profile_of(rows: list[dict[str, Any]], new_id: str) -> str:
         more += _FUNCTION.format(code=5, name="Write single coil", limit="max_write")
     if any(str(row.get("type", "")).endswith("32") for row in rows):
         more += _FUNCTION.format(code=16, name="Write registers", limit="max_write")
-        most = 2
+        most, order = 2, PAIRS
     watched = [row["code"] for row in rows if "quantity" in row and row["access"] == "r"]
     values = ", ".join(
         f"{{ parameter = {escaped_toml(code)} }}" for code in watched[:MOST_MONITORED]
     )
     parts = (row_as_toml("parameters", row) for row in rows)
-    return _HEAD.format(id=new_id, more=more, most=most, watched=values) + "\n".join(parts)
+    address = f"address = {escaped_toml(rule)}" if rule else '# address = "10 * number - 1"'
+    head = _HEAD.format(id=new_id, more=more + order, most=most, watched=values, address=address)
+    return head + "\n".join(parts)
 
 
 def _rows(text: str, file: str) -> Iterator[dict[str, Any]]:

@@ -107,7 +107,7 @@ def write_refusal(
         return Refusal(
             "unverified",
             f"{code} is unverified: no document of this family confirms its address"
-            f" {parameter.number}. Compare it with the keypad, then confirm it once.",
+            f" {parameter.number}. Compare it with the keypad, then confirm it (--confirm {code}).",
         )
     if needs_standstill(profile, parameter) and state not in AT_REST:
         text = _NOT_AT_REST if state else _STATE_NOT_KNOWN

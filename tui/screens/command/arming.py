@@ -117,8 +117,11 @@ class ArmingKeys(PanelScreen):
             self._ask_for(other)
             return
         if self.session.is_unconfirmed and not self.session.contradiction:
-            self._confirm_profile()
-            return
+            opened = self.app.opened
+            if opened is None or opened.simulation is None or opened.line is not self.session.line:
+                self._confirm_profile()
+                return
+            self.session.confirm_profile()
         stamp, stroke = self.session.work.stops, self.app.stroke
         if stroke is not None and stroke.stamp != self.app.stop_stamp():
             return  # a stop came while the key went through the screen

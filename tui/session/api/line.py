@@ -104,6 +104,8 @@ class LineCalls:
         session = DriveSession(line, address, found, reported)
         if session.contradiction:
             raise Contradiction(session.contradiction)
+        if self._opened.simulation is not None and session.is_unconfirmed:
+            session.confirm_profile()
         await check_byte_order(Reader(session), Priority.OPERATOR_READ)
         if self._opened.known is not None:
             self._opened.known.note(reported, address, found.id)

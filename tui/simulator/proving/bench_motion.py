@@ -8,6 +8,7 @@ from tui.drive.orders import last_word
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.reference_ways import reference_ways
 from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, ReferenceWay
+from tui.drive.sentences import any_of
 from tui.drive.shown import depends_on
 from tui.drive.values import raw_range
 
@@ -46,7 +47,26 @@ def spin_motor(bench: ProofBench, id: OrderId, order: Order | None = None) -> No
         raise Unproved(f"after {REACHED_SECONDS:.0f} s the drive shows {name} at {hz:.1f} Hz")
     shown = bench.state().direction
     if shown is not None and shown != id:
-        raise Unproved(f"the status word shows {shown}, the motor turns in {id}")
+        mark = bench.chart.direction
+        word = bench.profile[mark.parameter] if mark is not None else None
+        text = f"the status word shows {shown}, the motor turns in {id}"
+        if word is not None and word.code not in bench.chart.status_codes:
+            text += without_role(word)
+        raise Unproved(text)
+
+
+ROLES = ("frequency_reference", "ramp_output", "output_frequency", "speed")
+"""Quantities of the values that follow the simulated motor."""
+
+
+def without_role(parameter: Parameter) -> str:
+    """Return that a value has no quantity that follows the simulated motor; else empty."""
+    if parameter.quantity in ROLES:
+        return ""
+    code, roles = parameter.code, any_of(ROLES)
+    if parameter.quantity is None:
+        return f". {code} has no quantity, so it does not follow the motor. Give it {roles}"
+    return f". {code} is {parameter.quantity}, which does not follow the motor. Give it {roles}"
 
 
 def start_motor(bench: ProofBench, id: OrderId) -> bool:

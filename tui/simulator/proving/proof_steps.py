@@ -40,6 +40,7 @@ from .bench_motion import (
     stop_motor,
     top_hertz,
     trip_drive,
+    without_role,
 )
 from .drive_steps import drive_steps
 from .proof_bench import ProofBench, ProofStep, Unproved, proof_step
@@ -204,7 +205,8 @@ def _compare(profile: Profile, chart: Chart | None, way: ReferenceWay) -> None:
         shown = present_hertz(bench, feedback)
         slip = SLIP_HZ if feedback is not None and feedback.unit == "rpm" else 0.0
         if shown is not None and abs(shown - hz) > HZ_TOLERANCE + slip:
-            raise Unproved(f"{hz:.1f} Hz: the feedback shows {shown:.1f} Hz")
+            why = without_role(feedback) if feedback is not None else ""
+            raise Unproved(f"{hz:.1f} Hz: the feedback shows {shown:.1f} Hz{why}")
     stop_motor(bench, "stop")
 
 
