@@ -290,7 +290,7 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
         profile = library.load(known)
     session = DriveSession(opened.line, target.device, profile, reported)
     if session.contradiction:
-        believe_the_person(session, target)
+        believe_the_person(session, forced=target.force_profile, by_recipe=target.by_recipe)
     if opened.simulation is not None and session.is_unconfirmed and not session.contradiction:
         session.confirm_profile()
     await confirm_unproved(session)

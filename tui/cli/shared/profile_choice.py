@@ -13,8 +13,6 @@ if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity
     from tui.session.drive import DriveSession
 
-    from .options import Target
-
 FORCE_PROFILE = "--force-profile"
 
 
@@ -38,9 +36,9 @@ async def confirm_unproved(session: DriveSession) -> None:
     )
 
 
-def _way_to_profile(reported: str | None, target: Target) -> str:
+def _way_to_profile(reported: str | None, *, by_recipe: bool) -> str:
     """Return how to correct a profile that the drive contradicts, where it was named."""
-    if target.by_recipe:
+    if by_recipe:
         return "Check the address, or correct the profile in the recipe of this drive."
     if not reported:
         return "Name the profile of that drive."
@@ -51,12 +49,15 @@ def _way_to_profile(reported: str | None, target: Target) -> str:
     return f"Name -p {reported}, or leave -p away."
 
 
-def believe_the_person(session: DriveSession, target: Target) -> None:
-    """Use a profile that the drive contradicts if --force-profile is given; else raise."""
+def believe_the_person(session: DriveSession, *, forced: bool, by_recipe: bool) -> None:
+    """Use a profile that the drive contradicts if it is forced; else raise.
+
+    With `by_recipe` a recipe has named it.
+    """
     from tui.session.connect.contradiction import Contradiction
 
-    if not target.force_profile:
-        way = _way_to_profile(session.known_identity.profile, target)
+    if not forced:
+        way = _way_to_profile(session.known_identity.profile, by_recipe=by_recipe)
         raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
     session.bar_unconfirmed()
     context = click.get_current_context(silent=True)
