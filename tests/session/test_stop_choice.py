@@ -117,7 +117,7 @@ class Scripted(FakeLine):
         return answer
 
     async def read(self, device: int, address: int, count: int = 1, **how: Any) -> Reply:
-        assert (device, count, how) == (1, 1, {"priority": Priority.STOP})
+        assert (device, count, how) == (1, 1, {"priority": Priority.STOP, "function": 3})
         word = self._answer("r", address)
         return cast(Reply, type("Words", (), {"words": (word, 0xDEAD)}))
 
@@ -258,7 +258,7 @@ async def test_unidentified_drive_is_described_as_one_of_single_words(
     monkeypatch.setattr(line, "describe", lambda *what: described.append(what))
     await first(line, journal)
     assert described == [(1, ONE_WORD)]
-    assert first_stops.ONE_WORD.functions == {3, 6, 43}
+    assert first_stops.ONE_WORD.functions == {1, 2, 3, 5, 6, 17, 43}
     assert (ONE_WORD.max_read, ONE_WORD.max_write) == (1, 1)
     assert (ONE_WORD.max_read_23, ONE_WORD.max_write_23) == (0, 0)
     assert Read.function in ONE_WORD.functions

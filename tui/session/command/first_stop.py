@@ -26,7 +26,11 @@ from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
 
 ONE_WORD = Limits(
-    functions=frozenset({1, 2, 3, 5, 6, 43}), max_read=1, max_write=1, max_read_23=0, max_write_23=0
+    functions=frozenset({1, 2, 3, 5, 6, 17, 43}),
+    max_read=1,
+    max_write=1,
+    max_read_23=0,
+    max_write_23=0,
 )
 """Requests allowed to an unidentified drive."""
 STOP_OF_SEVERAL = replace(
