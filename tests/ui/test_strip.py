@@ -22,6 +22,7 @@ from tui.screens.keys.table import TABBED
 from tui.session.command.commander import STILL_IN_FAULT
 from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
+from tui.widgets.replay_bar import ReplayView, replay_line
 from tui.widgets.strip import BarMessage, DriveNow, StripView, strip_line, tabs_line
 
 RUNS = DriveNow(
@@ -265,3 +266,21 @@ def test_line_that_cannot_be_used_is_named_with_its_time(
     source._app.opened = None
     assert FrameSource._line_trouble(source, 100.0) == ""
     assert FrameSource._line_trouble(source, 100.0, opened) == text
+
+
+@pytest.mark.parametrize("width", [60, 80, 120])
+def test_row_of_a_replay_cuts_the_name_and_never_the_state(width: int) -> None:
+    state = "was read 12 s before" if width > 60 else "FORWARD"
+    view = ReplayView(
+        0.0,
+        60.0,
+        30.0,
+        1.0,
+        playing=False,
+        drive=f"12 ATV71HD15N4 was {state.removeprefix('was ')}",
+    )
+    text = replay_line(view, width).plain
+    assert "  12" in text
+    assert len(text) == width
+    assert f"{state} " in text
+    assert text.endswith("nothing is sent ")

@@ -134,7 +134,7 @@ class FrameSource:
             name = drive.name or drive.model
             shown = f"{drive.device} {name} was {drive.words}"
             if drive.age is not None:
-                shown = f"{drive.device} {name} was last read {age_text(drive.age)} before"
+                shown = f"{drive.device} {name} was read {age_text(drive.age)} before"
         events = tuple((event.utc / 1e6, event.kind) for event in replay.events)
         return ReplayView(
             clock.begin, clock.end, clock.monotonic(), clock.speed, clock.playing, shown, events

@@ -21,6 +21,10 @@ NOTHING_IS_SENT = "nothing is sent"
 EVENT_SIGNS: Mapping[str, str] = {"fault": "■", "failed": "■", "stop": "▼", "commander": "▶"}
 OTHER_EVENT = "●"
 HERE = "█"
+REPLAY_NAME_LEAST = 4
+"""Cells of a drive's address and name beside its state."""
+DATE_FROM = 72
+"""Width of the terminal from which the first row has the date."""
 BAR_LEAST = 10
 """Cells of the bar of time in the narrowest terminal."""
 
@@ -45,14 +49,24 @@ def replay_line(view: ReplayView, width: int) -> Text:
     sign = "▶▶" if view.playing else "HELD"
     text.append(f" ×{view.speed:g} {sign:<4}", REPLAY_BLOCK)
     text.append(f" {time.strftime('%H:%M:%S', time.localtime(view.now))}", REPLAY_BLOCK)
-    text.append(f" {time.strftime('%d %b', time.localtime(view.now))}", REPLAY_FAINT)
+    if width >= DATE_FROM:
+        text.append(f" {time.strftime('%d %b', time.localtime(view.now))}", REPLAY_FAINT)
     end = f" {NOTHING_IS_SENT} "
     room = width - text.cell_len - len(end)
-    drive = short(plain(view.drive), max(0, room - 2)) if room > 2 else ""
+    drive = _drive(plain(view.drive), room - 2)
     text.append(f"  {drive}".ljust(max(0, room)), REPLAY_BLOCK)
     text.append(end, REPLAY_FAINT)
     text.truncate(width, pad=True)
     return text
+
+
+def _drive(text: str, room: int) -> str:
+    """The drive and its state in at most `room` cells: its name is cut first."""
+    name, was, state = text.rpartition(" was ")
+    left = room - len(was + state)
+    if left >= REPLAY_NAME_LEAST:
+        return f"{short(name, left)}{was}{state}"
+    return short(f"{name.partition(' ')[0]} {state}" if was else text, room) if room > 0 else ""
 
 
 def time_line(view: ReplayView, width: int) -> Text:
