@@ -18,12 +18,13 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.parameters.edit_value import EditNumber, PickValue
 from tui.screens.startup.run_rows import RunRows
 from tui.screens.startup.screen import StartUpScreen
+from tui.screens.startup.view import StartUpView, walk_lines
 from tui.session.clock import REAL_CLOCK
 from tui.session.drive import DriveSession
 from tui.session.journal import Entry, Journal
 from tui.session.monitor.trend import TrendPoint
 from tui.session.startup.judging import StepRow
-from tui.session.startup.start_up import StartUp
+from tui.session.startup.start_up import StartUp, open_start_up
 
 from .test_command_flows import Bench, bench, writes
 from .test_flows import shown, until
@@ -236,3 +237,24 @@ async def test_no_row_of_any_step_writes_or_moves_a_motor(family: str) -> None:
                     await made.pilot.press("r", "enter")
                 assert writes(made.app) == [], (step.step, number)
                 assert made.speed() == 0
+
+
+@pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])
+def test_step_is_whole_on_every_screen(size: tuple[int, int]) -> None:
+    """At 80 x 24 the sources ended at the lower edge, at 60 x 16 the tasks did."""
+    for family in ("atv71", "powerdrive"):
+        profile = library.load(family)
+        opened = open_start_up(DriveSession(FakeLine(), 1, profile), f"{family}-{size}", None)
+        for _ in opened.guide.steps:
+            step = opened.step
+            view = StartUpView(opened, profile, {}, {}, {}, 0.0, "", lambda *_: False)
+            lines = [line.plain for line in walk_lines(view, size[0], size[1] - 5)]
+            assert len(lines) == size[1] - 5
+            assert max(map(len, lines)) <= size[0]
+            text = " ".join(" ".join(line.partition("│")[2] for line in lines).split())
+            assert step.text in text, step.step
+            if size[1] > 16:
+                assert step.note in text, step.step
+                assert "Source: " in text, step.step
+                assert f"({step.confidence})" in text, step.step
+            opened.go(1)

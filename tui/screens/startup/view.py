@@ -17,7 +17,7 @@ from tui.session.shown import Shown
 from tui.session.startup.judging import TURNED, StepRow, changed_codes
 from tui.session.startup.start_up import StartUp
 from tui.session.startup.steps import KIND_ACCESS, GuideStep
-from tui.widgets.drawing import cut, cut_at_word, rule, wrapped
+from tui.widgets.drawing import cut, cut_at_word, fitted_names, rule, wrapped
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
@@ -43,6 +43,16 @@ STEPS_WIDTH, RESULT_WIDTH, STEP_ROOM = 24, 18, 24
 """Columns of the steps; more columns for their results on a wide screen, and the most of a name
 there."""
 RESULTS_FROM = 110
+STEP_NUMBERS_WIDTH, STEP_NAMES_FROM = 6, 72
+"""Columns of the steps on a narrow screen, which has no room for their names."""
+STEP_TASK_LINES, STEP_NOTE_LINES, STEP_SOURCE_LINES = 5, 6, 3
+"""Most lines of the task, the note and the source of a step."""
+WRAP_LOSS = 10
+"""Cells that may be lost at the end of each wrapped line."""
+FOOT_RULE_FROM = 25
+"""Rows from which the foot has a line of its own above it."""
+STEP_ROWS_LEAST = 3
+"""Rows of a step that are always shown."""
 LABEL_WIDTH, VALUE_ROOM, NAME_WIDTH = 19, 14, 19
 """Columns of a usual label, the least beside a longer one, and those of a parameter's name."""
 RESULT_LABELS = {
@@ -90,7 +100,8 @@ def title_line(view: StartUpView, width: int) -> Text:
 def walk_lines(view: StartUpView, width: int, height: int) -> list[Text]:
     """Return all lines, exactly `height` of them."""
     left_width = STEPS_WIDTH + (RESULT_WIDTH if width >= RESULTS_FROM else 0)
-    foot = foot_lines(view, width)
+    left_width = left_width if width >= STEP_NAMES_FROM else STEP_NUMBERS_WIDTH
+    foot = foot_lines(view, width, height)
     rows = height - len(foot)
     left = _steps(view, left_width, rows)
     right = _step(view, width - left_width - 3, rows)
@@ -128,7 +139,8 @@ def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
         here = number == at + 1
         text = Text(" ▸" if here else "  ", ATTENTION, no_wrap=True)
         text.append(sign, style)
-        text.append(f" {number:>2} {cut(plain(step.step), room)}", STRONG if here else PLAIN)
+        name = f" {cut(plain(step.step), room)}" if width > STEP_NUMBERS_WIDTH else ""
+        text.append(f" {number:>2}{name}", STRONG if here else PLAIN)
         if width > STEPS_WIDTH:
             text.append(f" {cut(_result(view, step), width - 8 - room)}", FAINT)
         lines.append(text)
@@ -146,28 +158,47 @@ def _result(view: StartUpView, step: GuideStep) -> str:
 def _step(view: StartUpView, width: int, rows: int) -> list[Text]:
     """Return the present step: access, task, its rows, note and source."""
     start_up = view.start_up
-    step, record = start_up.step, start_up.record
+    step = start_up.step
     sign, style = STEP_SIGNS[_state(view, step)]
     head = Text(f"{sign} ", style, no_wrap=True)
     head.append(f"{start_up.index + 1} {plain(step.step)}", STRONG)
     top = [head, *(Text(line, style) for line in wrapped(state_text(view), width, 2))]
-    for label, text in access(view.profile, step):
-        top += _wrapped(label, text, width, 2)
-    top += [Text(line, PLAIN) for line in wrapped(plain(step.text), width, 3)]
-    note = [Text(line, FAINT) for line in wrapped(plain(step.note), width, 6)]
-    source = f"Source: {step_source(view.profile, step)}"
-    below = [*note, *(Text(line, FAINT) for line in wrapped(plain(source), width, 3))]
-    if record.past:
-        below.append(Text(cut_at_word(f"Before: {plain(record.past[-1])}", width), FAINT))
+    task = [Text(line, PLAIN) for line in wrapped(plain(step.text), width, STEP_TASK_LINES)]
     body = [_row(view, row, width, number == start_up.row) for number, row in _numbered(view)]
-    if len(top) + len(body) + len(below) + 2 <= rows:
-        body = [Text(""), *body, Text("")]
-    # the rows are never cut off: first the note goes, then the rows scroll with the cursor
-    room = max(3, rows - len(top))
+    note = wrapped(plain(step.note), width, STEP_NOTE_LINES)
+    # the task is never cut off, nor the note, which may be a warning: what the step reads and
+    # writes gives way to them and to one line of the source, then the rows scroll
+    for most in (2, 1, 0):
+        words = [
+            line
+            for label, text in access(view.profile, step)
+            for line in _wrapped(label, text, width, most)
+        ]
+        if len(top) + len(words) + len(task) + len(body) + len(note) < rows:
+            break
+    top += [*words, *task]
+    room = max(STEP_ROWS_LEAST, rows - len(top) - len(note))
     if len(body) > room:
         first = max(0, min(start_up.row - room // 2, len(body) - room))
         body = body[first : first + room]
+    below = _below(view, note, width, rows - len(top) - len(body))
+    if len(top) + len(body) + len(below) + 2 <= rows:
+        body = [Text(""), *body, Text("")]
     return [*top, *body, *below][:rows]
+
+
+def _below(view: StartUpView, note: list[str], width: int, rows: int) -> list[Text]:
+    """Return note, source and last result; in few rows the source is shortened in its middle."""
+    step, past = view.start_up.step, view.start_up.record.past
+    source = plain(f"Source: {step_source(view.profile, step)}")
+    before = [cut_at_word(f"Before: {plain(past[-1])}", width)] if past else []
+    left = max(0, min(STEP_SOURCE_LINES, rows - len(note)))
+    lines = wrapped(source, width, left + 1)
+    if len(lines) > left:
+        cells = left * width - (left - 1) * WRAP_LOSS
+        lines = wrapped(fitted_names((source,), cells)[source], width, left) if left else []
+    shown = [*note, *lines, *before]
+    return [Text(line, FAINT) for line in shown[: max(0, rows)]]
 
 
 def _numbered(view: StartUpView) -> list[tuple[int, StepRow]]:
@@ -300,7 +331,7 @@ def _value_text(parameter: Parameter, value: Value) -> str:
     return f"raw {value.display}" if unknown else value.display
 
 
-def foot_lines(view: StartUpView, width: int) -> list[Text]:
+def foot_lines(view: StartUpView, width: int, height: int) -> list[Text]:
     """Return what is not of one step: trouble with the disk, and what has changed."""
     start_up = view.start_up
     lines = []
@@ -312,5 +343,6 @@ def foot_lines(view: StartUpView, width: int) -> list[Text]:
         lines.append(Text(cut_at_word(text, width).rstrip(), ALARM))
     elif start_up.resumed:
         begun = start_up.progress.begun[:16].replace("T", " ")
-        lines.append(Text(f" Begun {begun}. For another drive: Ctrl+P, then type begin.", FAINT))
-    return [rule("", width), *lines] if lines else []
+        how = "then type begin" if width >= STEP_NAMES_FROM else "begin"
+        lines.append(Text(f" Begun {begun}. For another drive: Ctrl+P, {how}.", FAINT))
+    return [rule("", width), *lines] if lines and height >= FOOT_RULE_FROM else lines
