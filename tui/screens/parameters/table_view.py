@@ -96,6 +96,9 @@ def layout_of(editor: Editor, items: Sequence[TableLine], width: int) -> TableLa
         max(map(len, names), default=0) + 1,
     )
     columns = fitting_columns(width, filled)
+    if filled.staged and not editor.other and columns.name < filled.name:
+        # the details have the factory value
+        columns = fitting_columns(width, filled._replace(other=False))
     return TableLayout(columns, fitted_names(names, columns.name - 1))
 
 
