@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
+from tui.drive.settings.writable import is_setting
 from tui.drive.values import from_words, is_field, to_words, type_range, word_count
 
 from .errors import SimulatorError
@@ -93,10 +94,14 @@ class Registers:
             self._saved[copied] = word & 0xFFFF
             address = copied
         self._words[address] = word & 0xFFFF
-        if parameter.effective == "at-once":
+        if parameter.effective == "at-once" and not self._waits(parameter):
             self._in_force[address] = word & 0xFFFF
         if parameter.storage in ("eeprom", "unknown") and address not in self._volatile:
             self._saved[address] = word & 0xFFFF
+
+    def _waits(self, parameter: Parameter) -> bool:
+        """Return True if a written word is used only after the family's entering word."""
+        return self.profile.data.memory.enter is not None and is_setting(self.profile, parameter)
 
     # Access by the drive
 

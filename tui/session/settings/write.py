@@ -14,6 +14,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.sentences import sentence
 from tui.drive.settings.memory_orders import eeprom_use
+from tui.drive.settings.writable import is_setting
 from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, is_field, to_words, word_count
 
@@ -78,6 +79,9 @@ class Writer:
                 forbidden=self.permit.refusal if self.permit is not None else None,
                 within=within,
             )
+            answer = NOT_IN_EFFECT
+            await self._enter(parameter)
+            answer = "ok"
             back = await self._read_back(parameter) if read_back else None
             if back is not None and (back ^ raw) & check & 0xFFFFFFFF:
                 answer = "holds another value"
@@ -117,6 +121,29 @@ class Writer:
                 # an error of the journal must not make a stop that was sent fail
                 log.exception("a stop of device %s is not in the journal", session.device)
         return back is not None
+
+    async def _enter(self, parameter: Parameter) -> None:
+        """Have the drive use a written setting, if its family needs a further word for that.
+
+        Raises NotTaken if that word is refused or not sent, and the line's errors.
+        """
+        profile = self.session.profile
+        enter = profile.data.memory.enter
+        if enter is None or self._is_copy(parameter) or not is_setting(profile, parameter):
+            return
+        if enter.when is not None:
+            await Reader(self.session).read([enter.when.parameter])
+            if enter.when.holds(self.session.image.raws) is False:
+                return
+        try:
+            await self.write_parameter(
+                profile[enter.parameter], enter.raw, why=f"enter {parameter.code}", read_back=False
+            )
+        except (RequestRefused, DeviceException, DriveError) as error:
+            raise NotTaken(
+                f"{parameter.code} was written, but the drive does not use it yet:"
+                f" {sentence(str(error))} The next setting that is written enters it, too."
+            ) from error
 
     def _is_copy(self, parameter: Parameter) -> bool:
         """Return True for the copy of a setting in EEPROM, whose value the image does not hold."""
@@ -203,6 +230,8 @@ class Writer:
 _HOLDS = "It holds {value}, read back later."
 _HOLDS_ACCEPTED = "Accepted: it holds {value}, read back later."
 _HOLDS_NOT_ACCEPTED = "Not accepted: it holds {value}, read back later."
+NOT_IN_EFFECT = "not in effect"
+"""Journal text of a setting whose entering word was refused or not sent."""
 CUT_SHORT = "canceled by a stop, may have taken effect"
 """Journal text of a write that was canceled before its reply."""
 

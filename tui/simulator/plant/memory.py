@@ -7,6 +7,7 @@ and a recall are only accepted while the motor is not supplied.
 from __future__ import annotations
 
 from tui.drive.profile.schema import Parameter
+from tui.drive.settings.writable import is_setting
 
 from ..body import Body
 
@@ -47,17 +48,27 @@ class SettingsMemory:
     def _declared(self, parameter: Parameter) -> None:
         """Carry out the commands to the memory that a profile of any make declares."""
         memory, raw = self._body.profile.data.memory, self._body.registers.present(parameter)
+        if (enter := memory.enter) and (enter.parameter, enter.raw) == (parameter.code, raw):
+            self._enter()
         for order, save in ((memory.save, True), (memory.factory, False)):
             if order is None or order.parameter != parameter.code or self._body.turning:
                 continue
             if raw != order.raw and not (order.bit and raw & order.raw == order.raw):
                 continue
             if save:
+                self._enter()
                 self._save()
             else:
                 self._body.registers.to_factory(self._kept())
             if not order.keeps_value:
                 self._body.registers.put(parameter, raw & ~order.raw if order.bit else 0)
+
+    def _enter(self) -> None:
+        """Put all written settings in force that wait for the entering word."""
+        registers = self._body.registers
+        for parameter in registers.profile.parameters:
+            if parameter.effective == "at-once" and is_setting(registers.profile, parameter):
+                registers.put(parameter, registers.present(parameter))
 
     def _follow(self, source: Parameter) -> None:
         """Set the values whose factory settings depend on this one (HSP after bFr)."""

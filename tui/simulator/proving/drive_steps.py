@@ -128,6 +128,9 @@ def _memory(profile: Profile) -> Iterator[ProofStep]:
     setting = _setting(profile)
     if setting is None:
         return
+    if memory.enter is not None:
+        step = partial(_enter, profile, setting)
+        yield proof_step(("memory", "enter"), "settings take effect when entered", step)
     if memory.save is not None:
         yield proof_step(("memory", "save"), "settings are saved", partial(_save, profile, setting))
     if (copied := _setting(profile, copied=True)) is not None:
@@ -176,6 +179,19 @@ def _change(bench: ProofBench, setting: Parameter) -> int:
 def _command_memory(bench: ProofBench, parameter: Parameter, raw: int, *, bit: bool) -> None:
     bench.write(parameter, bench.read(parameter) | raw if bit else raw)
     bench.wait(5)
+
+
+def _enter(profile: Profile, setting: Parameter) -> None:
+    bench, enter = ProofBench(profile, None), profile.data.memory.enter
+    assert enter is not None
+    raw = next(_others(profile, setting))
+    bench.drive.set(setting.code, setting.factory or 0)
+    bench.write_only(setting, raw)
+    if bench.drive.registers.in_force(setting) == raw:
+        raise Unproved(f"{setting.code} takes effect without {enter.parameter}")
+    bench.write_only(profile[enter.parameter], enter.raw)
+    if bench.drive.registers.in_force(setting) != raw:
+        raise Unproved(f"{setting.code} has no effect after {enter.parameter} = {enter.raw}")
 
 
 def _save(profile: Profile, setting: Parameter) -> None:

@@ -25,6 +25,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, Order, OrderId, OrderWait, Parameter, State
 from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.sentences import any_of
+from tui.drive.settings.writable import is_setting
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_field, to_words, word_count
 from tui.drive.words import raw_of_word
@@ -116,6 +117,13 @@ class ProofBench:
         return from_words(parameter, self.words(parameter.address, count, parameter.function))
 
     def write(self, parameter: Parameter, raw: int) -> None:
+        """Write a raw value, and enter it if the family needs that; raises Unproved if refused."""
+        self.write_only(parameter, raw)
+        enter = self.profile.data.memory.enter
+        if enter is not None and is_setting(self.profile, parameter):
+            self.write_only(self.profile[enter.parameter], enter.raw)
+
+    def write_only(self, parameter: Parameter, raw: int) -> None:
         """Write a raw value; raises Unproved if the drive refuses it."""
         held = self.words(parameter.address, 1)[0] if is_field(parameter) else None
         words = to_words(parameter, raw if raw <= _most(parameter) else raw - 0x10000, held)

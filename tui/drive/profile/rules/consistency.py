@@ -157,12 +157,17 @@ def settings_of_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         yield ("faults", "parameter"), f"faults: {fault.code} cannot be read."
 
 
+def is_kept(parameter: Parameter) -> bool:
+    """Return True if a word is written as a setting, and not as a command."""
+    return parameter.access != "w" and parameter.storage != "ram" and parameter.holds != "command"
+
+
 def saving_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """Yield memory commands that would command the motor, change a value, or do two things."""
     parameters = {parameter.code: parameter for parameter in data.parameters}
     commands = {chart.command for chart in data.charts if chart.command}
-    orders = [("save", data.memory.save), ("factory", data.memory.factory)]
-    for key, order in orders:
+    enter, save, factory = data.memory.enter, data.memory.save, data.memory.factory
+    for key, order in (("enter", enter), ("save", save), ("factory", factory)):
         word = parameters.get(order.parameter) if order is not None else None
         if word is None:
             continue
@@ -170,7 +175,15 @@ def saving_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             yield ("memory", key), f"memory: {word.code} is the command word of the motor."
         elif word.unit:
             yield ("memory", key), f"memory: {word.code} is a value in {word.unit}, not a command."
-    save, factory = data.memory.save, data.memory.factory
+    if enter and (word := parameters.get(enter.parameter)) and is_kept(word):
+        yield (
+            ("memory", "enter"),
+            f"memory: {word.code} is a setting. The word after each setting is never one: give it"
+            ' the access w, or storage = "ram".',
+        )
+    if enter and factory and (enter.parameter, enter.raw) == (factory.parameter, factory.raw):
+        text = "memory: the word after each setting would return all to the factory values."
+        yield ("memory", "enter"), text
     if save and factory and (save.parameter, save.raw) == (factory.parameter, factory.raw):
         yield (
             ("memory", "factory"),

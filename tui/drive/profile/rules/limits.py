@@ -72,6 +72,8 @@ def _proposed(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
     for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
         if order is not None and not order.bit:
             yield ("memory", key, "raw"), order.parameter, order.raw
+    if (enter := data.memory.enter) is not None:
+        yield ("memory", "enter", "raw"), enter.parameter, enter.raw
     for index, parameter in enumerate(data.parameters):
         if parameter.factory is not None and is_enumeration(parameter):
             yield ("parameters", index, "factory"), parameter.code, parameter.factory

@@ -254,7 +254,11 @@ def writable_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     parameters = {parameter.code: parameter for parameter in data.parameters}
     places: list[tuple[TomlPath, str]] = [
         (("memory", key), order.parameter)
-        for key, order in (("save", data.memory.save), ("factory", data.memory.factory))
+        for key, order in (
+            ("enter", data.memory.enter),
+            ("save", data.memory.save),
+            ("factory", data.memory.factory),
+        )
         if order is not None
     ]
     for index, source in enumerate(data.control_sources):

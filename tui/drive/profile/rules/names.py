@@ -185,6 +185,10 @@ def _memory_names(data: ProfileData) -> Iterator[NamedPlace]:
             yield ("memory", key, "groups"), order.groups
             if order.done:
                 yield ("memory", key, "done"), order.done.parameter
+    if (enter := data.memory.enter) is not None:
+        yield ("memory", "enter", "parameter"), enter.parameter
+        if enter.when is not None:
+            yield ("memory", "enter", "when"), enter.when.parameter
     for place, when in enumerate(data.memory.eeprom.also_saved_by):
         yield ("memory", "eeprom", "also_saved_by", place), when.parameter
 

@@ -95,6 +95,16 @@ class MemoryOrder(Table, frozen=True, kw_only=True):
     source: str = ""
 
 
+class EnterWord(Table, frozen=True, kw_only=True):
+    """A word that must follow a written setting, for the drive to use it."""
+
+    parameter: str
+    raw: RawWord
+    when: When | None = None
+    """Condition under which it is needed; absent: always."""
+    source: str = ""
+
+
 class Eeprom(Table, frozen=True, kw_only=True):
     """Endurance of a drive's EEPROM."""
 
@@ -109,6 +119,8 @@ class Eeprom(Table, frozen=True, kw_only=True):
 class MemoryOrders(Table, frozen=True, kw_only=True):
     """Commands to a drive's memory; unknown ones are omitted."""
 
+    enter: EnterWord | None = None
+    """Written after each setting, before it is read back."""
     save: MemoryOrder | None = None
     factory: MemoryOrder | None = None
     eeprom: Eeprom = Eeprom()
