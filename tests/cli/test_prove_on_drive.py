@@ -6,12 +6,17 @@ from pathlib import Path
 
 import pytest
 
+from tui.cli.running import confirming
+from tui.cli.shared import profile_choice
 from tui.drive.profile import library
+from tui.drive.site_proof import unproved_commands
 from tui.session.acceptance.plan import planned_motions
 from tui.session.acceptance.profile_test import PROVED_HZ, profile_test
 from tui.session.acceptance.steps import MotionStep, StopStep
+from tui.simulator import DriveSpec, Simulation
 
 from .commands import ended, refused
+from .test_accept import person
 
 MS300 = library.packaged_folder() / library.PUBLIC / "ms300.toml"
 WITH_LINE = ("profiles", "--prove", MS300, "--line", "serial:/dev/none")
@@ -62,3 +67,28 @@ def test_test_of_a_profile_runs_slowly_and_tries_each_stop(id: str) -> None:
     ids = {order.id for chart in profile.data.charts for order in chart.orders}
     assert stops == ids & {"stop", "quick-stop", "freewheel"}
     assert len(planned_motions(test)) == len(test.steps)
+
+
+@pytest.mark.sweep
+@pytest.mark.parametrize("in_fault", [False, True])
+def test_commands_that_worked_are_proved_and_need_no_question(
+    in_fault: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    questions = person(monkeypatch, "y")
+    for module in (confirming, profile_choice):
+        monkeypatch.setattr(module, "may_ask", lambda: True)
+    with Simulation([DriveSpec("ms300", 1)]) as simulation:
+        line = "tcp:{}:{}".format(*simulation.serve_tcp())
+        if in_fault:
+            simulation.drive(1).provoke("1")
+        words = ("profiles", "--prove", MS300, "--line", line, "--arm", "--without-motor", "--json")
+        done = ended(0, *words)
+        assert any("Is this a real drive" in question for question in questions)
+        library.load.cache_clear()
+        left = {"reset"} - ({"reset"} if in_fault else set())
+        assert unproved_commands(library.load("ms300")) == left, done.output
+        monkeypatch.setattr(profile_choice, "may_ask", lambda: False)
+        ended(0, "reference", line, "10Hz", "--arm", "-p", "ms300")
+        assert "is unproved" in refused(5, "write", line, "01-00=50", "--arm", "-p", "ms300")
+    library.load.cache_clear()

@@ -19,6 +19,8 @@ from tui.bus.link import label
 from tui.bus.notes import LineNote
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile, digest_of, proof_text
+from tui.drive.profile.schema import Parameter
+from tui.drive.site_proof import is_proved_write, unproved_commands
 
 from .arming import Arming
 from .byte_order import ByteOrder
@@ -43,6 +45,10 @@ UNPROVED = (
     " the motor."
 )
 """Why a drive of an unproved profile is not armed, until a person confirms."""
+UNPROVED_WRITE = (
+    "Not written: {code} = this value is not proved on this site, and the profile of {name} is"
+    " written from public documents. Confirm the profile first."
+)
 
 
 class DriveSession:
@@ -80,8 +86,8 @@ class DriveSession:
         if self.contradiction:
             self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
         self.is_unconfirmed = profile.data.profile.unproved
-        """True if nothing but a stop is written, because its profile is unproved, and no person
-        has confirmed it."""
+        """True if only stops and what this site has proved are written, because its profile is
+        unproved, and no person has confirmed it."""
         if self.is_unconfirmed and not self.contradiction:
             self.bar_unconfirmed()
         self.byte_order = ByteOrder(device)
@@ -118,10 +124,10 @@ class DriveSession:
         self._hear_others()
 
     def bar_unconfirmed(self) -> None:
-        """Allow arming, unless the profile is unproved and not confirmed."""
-        unproved = UNPROVED.format(name=self.profile.name, proof=proof_text(self.profile))
-        text = f"Not armed: {unproved}"
-        self.arming.barred = text if self.is_unconfirmed else ""
+        """Allow arming, unless the profile is unproved, not confirmed, and its commands are not
+        proved on this site."""
+        barred = self.is_unconfirmed and unproved_commands(self.profile)
+        self.arming.barred = unproved_text(self) if barred else ""
 
     def confirm_profile(self) -> None:
         """Allow arming although the profile is unproved.
@@ -304,3 +310,16 @@ class CareData(msgspec.Struct, frozen=True):
 def packed_care(profile: Profile, identity: DriveIdentity | None, *, guessed: bool) -> bytes:
     """Encode the data by which another process can stop a drive."""
     return msgspec.msgpack.encode(CareData(profile.packed, identity, guessed))
+
+
+def unproved_text(session: DriveSession) -> str:
+    """Return why a drive of an unproved profile is not armed."""
+    profile = session.profile
+    return f"Not armed: {UNPROVED.format(name=profile.name, proof=proof_text(profile))}"
+
+
+def why_unproved(session: DriveSession, parameter: Parameter, raw: int) -> str:
+    """Return why a write needs a person who confirms the profile; empty if it does not."""
+    if not session.is_unconfirmed or is_proved_write(session.profile, parameter, raw):
+        return ""
+    return UNPROVED_WRITE.format(code=parameter.code, name=session.profile.name)

@@ -9,14 +9,18 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from getpass import getuser
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import click
 
 from tui.drive.chart import ENABLED_KINDS
 from tui.session.signals import BY_SIGNAL
 
-from ..documents.document import DocumentPart, DriveDocument
+from ..documents.accept_documents import (
+    AcceptanceCheckField,
+    AcceptanceStepField,
+    AcceptDocument,
+)
 from ..running.buffered_output import BufferedOutput
 from ..shared import asking
 from ..shared.asking import says_yes
@@ -44,64 +48,23 @@ from ..shared.sets import write_down
 from ..shared.standard_streams import given_file
 
 if TYPE_CHECKING:
+    from tui.drive.profile.schema import EvidenceKind
     from tui.session.acceptance.plan import HighSpeed
     from tui.session.acceptance.result import AcceptanceResult
     from tui.session.acceptance.step_file import AcceptanceFile
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
+    from tui.session.drive import DriveSession
     from tui.session.running.ending import Ending
+
+    Prove = Callable[[DriveSession, AcceptanceResult, EvidenceKind], None]
+    """Keeps what a test shows about a profile, with the kind of the drive as a person stated."""
 
 UNATTENDED = (
     "An acceptance test needs a person at the keyboard of a terminal: it is never run by a script,"
     " a pipe or in the background. Nothing was sent."
 )
 TURNED = {"r": "right", "right": "right", "l": "left", "left": "left"}
-
-
-class AcceptanceCheckField(DocumentPart):
-    """A value of a step, with its limit."""
-
-    name: str
-    value: str
-    limit: str
-    passed: bool
-
-
-class AcceptanceStepField(DocumentPart):
-    """A step of the test."""
-
-    number: int
-    kind: str
-    name: str
-    outcome: Literal["passed", "failed", "not run"]
-    text: str | None
-    seconds: float
-    checks: list[AcceptanceCheckField]
-    curve: str | None
-    """Name of the SVG file of its run."""
-
-
-class AcceptDocument(DriveDocument, kw_only=True):
-    """`accept`: the result of an acceptance test."""
-
-    command: Literal["accept"] = "accept"
-    name: str
-    passed: bool
-    why_not: str | None
-    begun: str
-    ended: str
-    ended_by: str | None
-    by: str
-    panel: str
-    profile_version: str
-    identity: dict[str, str]
-    file: str
-    file_hash: str
-    settings_hash: str | None
-    settings_hash_after: str | None
-    folder: str | None
-    """Folder with the files of the result; null if the test had not begun."""
-    steps: list[AcceptanceStepField]
 
 
 @command(
@@ -158,17 +121,18 @@ def accept_test(
     out: Path | None = None,
     read_only: bool = False,
     as_json: bool = False,
+    prove: Prove | None = None,
 ) -> None:
     """Carry out a test on a drive with a person at the terminal; --arm was given.
 
-    Raises Failure and Exit with the status.
+    `prove` keeps what the test shows about the profile. Raises Failure and Exit with the status.
     """
     _need_person()
     folder = out or Path(f"{test.path.stem}-{time.strftime('%Y%m%d-%H%M%S')}")
     if folder.exists():
         raise Failure(f"{folder} already exists. Name a new folder with --out.", USAGE)
     wanted = target._replace(profile_id=test.profile.id)
-    session = AcceptSession(test, wanted, folder, by or _login_name(), as_json)
+    session = AcceptSession(test, wanted, folder, by or _login_name(), as_json, prove)
     status = on_line(wanted, session.work, read_only=read_only)
     if status:
         raise click.exceptions.Exit(status)
@@ -219,6 +183,8 @@ class AcceptSession:
     folder: Path
     by: str
     as_json: bool
+    prove: Prove | None = None
+    _kind: EvidenceKind = "unknown"
     _stack: ExitStack = field(default_factory=ExitStack)
     _ending: Ending | None = None
     _begun: bool = False
@@ -226,7 +192,9 @@ class AcceptSession:
     async def work(self, opened: OpenLine) -> int:
         """Carry out the test; return the exit status. Its motor is at standstill afterwards."""
         from tui.session.acceptance.acceptance_run import AcceptanceRun
+        from tui.session.acceptance.profile_test import with_reset
         from tui.session.running.ending import Ending
+        from tui.session.running.watching import latest_of
         from tui.session.starts.keeper import StartKeeper
 
         loop, ending = asyncio.get_running_loop(), Ending()
@@ -239,6 +207,8 @@ class AcceptSession:
         with ending.by_signals(), self._stack:
             try:
                 async with watched(opened, self.target, StartKeeper("accept")) as (fleet, console):
+                    if self.prove is not None and latest_of(console).state.motion == "fault":
+                        self.test = with_reset(self.test)
                     run = AcceptanceRun(
                         fleet,
                         console,
@@ -249,13 +219,17 @@ class AcceptSession:
                         self._ask_turned,
                         self.by,
                     )
-                    result = await run.carry_out(lambda high: self._confirm(console, ending, high))
+                    result = await run.carry_out(
+                        lambda high: self._confirm(opened, console, ending, high)
+                    )
             finally:
                 if voice:
                     voice.finish()
         self._report(result)
         if run.not_stopped:
             raise Failure(run.not_stopped, DRIVE_REFUSED)
+        if self.prove is not None and self._begun:
+            self.prove(console.session, result, self._kind)
         return self._status(result, ending)
 
     def _status(self, result: AcceptanceResult, ending: Ending) -> int:
@@ -265,8 +239,11 @@ class AcceptSession:
             return BY_SIGNAL + ending.number
         return ENDED_AFTER_WRITING if result.ended_by else DIFFERENT
 
-    async def _confirm(self, console: DriveConsole, ending: Ending, high: HighSpeed | None) -> None:
+    async def _confirm(
+        self, opened: OpenLine, console: DriveConsole, ending: Ending, high: HighSpeed | None
+    ) -> None:
         """Show what will move; arm after a yes. Raises Failure, with nothing written."""
+        from ..running.confirming import drive_kind
         from ..running.keyboard import ended_by_typing
 
         _may_arm(console)
@@ -275,6 +252,8 @@ class AcceptSession:
             say(text, err=True)
         if not await says_yes(f"Carry out this test on device {console.device}?"):
             raise Failure("Not confirmed. Nothing was tested.", REFUSED_HERE)
+        if self.prove is not None:
+            self._kind = await drive_kind(opened)
         self._need_standstill(console)
         _may_arm(console)
         try:
@@ -286,12 +265,19 @@ class AcceptSession:
         self._ending = ending
         self._stack.enter_context(ended_by_typing(ending))
 
+    def _resets(self) -> bool:
+        """Return True if the test of a profile resets a fault before anything else."""
+        from tui.session.acceptance.steps import ResetStep
+
+        first = self.test.steps[:1]
+        return self.prove is not None and any(isinstance(step, ResetStep) for step in first)
+
     def _need_standstill(self, console: DriveConsole) -> None:
         """Raise Failure if the drive runs, is in fault, or its state is not known."""
         from tui.session.running.watching import latest_of
 
         state = latest_of(console).state
-        if state.motion == "fault":
+        if state.motion == "fault" and not self._resets():
             text = (
                 f"Not tested: device {console.device} is in fault. Clear its cause, then:"
                 f" drivepanel reset {self.target.line_text} -d {console.device} --arm"

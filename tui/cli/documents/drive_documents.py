@@ -35,7 +35,7 @@ from .parts import (
 class FindingField(DocumentPart):
     """Result for one statement of a profile, as in the file of evidence."""
 
-    subject: Literal["identity", "address", "range", "value", "frame"]
+    subject: Literal["identity", "address", "range", "value", "frame", "command", "reference"]
     name: str
     statement: str
     result: Literal["confirmed", "contradicted", "open"]

@@ -12,7 +12,13 @@ import msgspec
 
 import tui
 from tui.drive.errors import ValueRefused
-from tui.drive.profile.schema import EvidenceDrive, EvidenceFinding, Parameter, ProfileEvidence
+from tui.drive.profile.schema import (
+    EvidenceDrive,
+    EvidenceFinding,
+    EvidenceKind,
+    Parameter,
+    ProfileEvidence,
+)
 from tui.drive.sentences import counted
 
 from ..shared.asking import may_ask, says_yes, typed_answer
@@ -25,6 +31,7 @@ from ..shared.sets import counter, write_down
 from ..shared.standard_streams import STANDARD
 
 if TYPE_CHECKING:
+    from tui.session.acceptance.result import AcceptanceResult
     from tui.session.conformance import Conformance
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
@@ -46,23 +53,19 @@ def confirm_profile(
     """
 
     async def work(opened: OpenLine) -> int:
-        from tui.drive.profile.library import evidence_folder
         from tui.session.conformance import Conformance
 
         # a drive that is not polled while a person types may react to its timeout
         async with watched(opened, target._replace(force_profile=True)) as (_, console):
             session = console.session
             wanted = [session.profile.find(code).code for code in codes]
-            kind = await _kind(opened)
+            kind = await drive_kind(opened)
             test = Conformance(session)
             await test.run(counter())
             for code in (wanted or test.codes_to_ask()) if may_ask() else wanted:
                 await _ask_display(test, code)
         evidence = _evidence(session, test.findings, kind)
-        now = datetime.now().strftime("%Y%m%d-%H%M%S")
-        path = file or evidence_folder() / f"{session.profile.id}-{now}.json"
-        if file is None and kind != "drive":
-            path = Path(f"{session.profile.id}-{now}.json")
+        path = file or _new_file(evidence)
         if not as_json:
             # before the disk can refuse the file; beside the evidence on standard output
             _say_findings(evidence, err=path == STANDARD)
@@ -76,7 +79,7 @@ def confirm_profile(
     return on_line(target, work, read_only=True)
 
 
-async def _kind(opened: OpenLine) -> str:
+async def drive_kind(opened: OpenLine) -> EvidenceKind:
     """Return whether the drive is a real one, as a person says; a simulated one is never asked."""
     if opened.simulation is not None:
         return "simulated"
@@ -84,6 +87,28 @@ async def _kind(opened: OpenLine) -> str:
         return "unknown"
     question = "Is this a real drive, not a simulated one? Only a real one proves anything."
     return "drive" if await says_yes(question) else "simulated"
+
+
+def _new_file(evidence: ProfileEvidence) -> Path:
+    """Return a new file: in the folder of this site only if it may prove something."""
+    from tui.drive.profile.library import evidence_folder
+
+    now = datetime.now().strftime("%Y%m%d-%H%M%S")
+    folder = evidence_folder() if evidence.tested.kind == "drive" else Path()
+    return folder / f"{evidence.profile}-{now}.json"
+
+
+def keep_command_proofs(
+    session: DriveSession, result: AcceptanceResult, kind: EvidenceKind
+) -> None:
+    """Write what a test of commands without a motor has shown, and report it. Raises Failure."""
+    from tui.session.acceptance.profile_test import command_findings
+
+    evidence = _evidence(session, command_findings(session, result), kind)
+    path = _new_file(evidence)
+    _say_findings(evidence, err=True)
+    _write(path, evidence, force=False)
+    _say_result(evidence, path, err=True)
 
 
 async def _ask_display(test: Conformance, code: str) -> None:
@@ -108,7 +133,9 @@ async def _ask_display(test: Conformance, code: str) -> None:
             return
 
 
-def _evidence(session: DriveSession, findings: list[EvidenceFinding], kind: str) -> ProfileEvidence:
+def _evidence(
+    session: DriveSession, findings: list[EvidenceFinding], kind: EvidenceKind
+) -> ProfileEvidence:
     from tui.session.journal import now_text
 
     identity = session.known_identity
@@ -116,7 +143,7 @@ def _evidence(session: DriveSession, findings: list[EvidenceFinding], kind: str)
         vendor=identity.vendor,
         reference=identity.reference,
         firmware=identity.version_text if identity.version else "",
-        kind=kind,  # type: ignore[arg-type]
+        kind=kind,
         link=_link_text(session),
     )
     return ProfileEvidence(
@@ -186,7 +213,8 @@ def _say_result(evidence: ProfileEvidence, path: Path, *, err: bool) -> None:
         f" {evidence.count('open')} open. Evidence: {path}",
         err=err,
     )
-    proved = sum(f.subject == "value" and f.result == "confirmed" for f in evidence.findings)
+    shown = [f.subject for f in evidence.findings if f.result == "confirmed"]
+    proved, followed = shown.count("value"), shown.count("command") + shown.count("reference")
     if evidence.is_of_another_family:
         say("It proves nothing: the drive is of another family.", err=err)
     elif evidence.tested.kind != "drive":
@@ -194,3 +222,5 @@ def _say_result(evidence: ProfileEvidence, path: Path, *, err: bool) -> None:
     elif proved:
         texts = ("1 value is proved on this site.", "{count} values are proved on this site.")
         say(counted(proved, *texts), err=err)
+    elif followed:
+        say("What was confirmed is proved on this site.", err=err)

@@ -99,6 +99,8 @@ def prove_on_line(
     from tui.drive.profile import library
     from tui.session.acceptance.profile_test import MAY_TRY, MOTOR_FIRST, PROVED_HZ, profile_test
 
+    from .confirming import keep_command_proofs
+
     if path is None or more:
         raise click.UsageError("--line is for --prove of one file.")
     prove_files([path], as_json=False, quiet=as_json)
@@ -111,7 +113,7 @@ def prove_on_line(
         raise Failure(MOTOR_FIRST, REFUSED_HERE)
     for line in MAY_TRY:
         say(line.format(hz=PROVED_HZ), err=True)
-    accept_test(profile_test(profile, path), target, as_json=as_json)
+    accept_test(profile_test(profile, path), target, as_json=as_json, prove=keep_command_proofs)
 
 
 def _step_line(step: ProofStepField) -> str:

@@ -10,6 +10,7 @@ from .asking import may_ask, says_yes
 from .say import say
 
 if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
     from tui.session.connect.identify import DriveIdentity
     from tui.session.drive import DriveSession
 
@@ -19,14 +20,21 @@ FORCE_PROFILE = "--force-profile"
 async def confirm_unproved(session: DriveSession) -> None:
     """Ask a person at the terminal before a command with --arm uses an unproved profile.
 
-    Without one, arming is refused with the way out.
+    Without one, arming is refused with the way out. A command that this site has proved is not
+    asked about.
     """
     from tui.drive.profile.profile import proof_text
+    from tui.session.drive import unproved_text
 
     context = click.get_current_context(silent=True)
     if not session.is_unconfirmed or context is None or not context.params.get("arm"):
         return
-    if may_ask() and await says_yes(f"{session.arming.barred} Write to device {session.device}?"):
+    if session.contradiction:
+        return
+    if _is_proved(session.profile, context):
+        session.arming.barred = ""  # each word is still compared with what was proved
+        return
+    if may_ask() and await says_yes(f"{unproved_text(session)} Write to device {session.device}?"):
         session.confirm_profile()
         return
     session.arming.barred = (
@@ -34,6 +42,26 @@ async def confirm_unproved(session: DriveSession) -> None:
         " and no person at a terminal. For a script, make a profile of your own and prove it:"
         f" drivepanel profiles new NAME --from {session.profile.id}"
     )
+
+
+def _is_proved(profile: Profile, context: click.Context) -> bool:
+    """Return True if all that a command may send was proved on this site."""
+    from tui.drive.site_proof import unproved_commands
+    from tui.session.command.reference import reference_parameters
+
+    given = context.params
+    needed: dict[str, set[str]] = {
+        "run": {"reverse" if given.get("reverse") else "forward"},
+        "reference": set(),
+        "reset": {"reset"},
+    }
+    if (ids := needed.get(context.info_name or "")) is None:
+        return False
+    if context.info_name == "reference" or given.get("reference"):
+        ids |= {parameter.code for parameter in reference_parameters(profile)}
+    if given.get("take_control"):
+        ids.add("take-control")
+    return not unproved_commands(profile) & {*ids, "stop"}
 
 
 def _way_to_profile(reported: str | None, *, by_recipe: bool) -> str:

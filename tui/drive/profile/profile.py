@@ -81,14 +81,14 @@ def is_verified(parameter: Parameter) -> bool:
 
 
 def proof_text(profile: Profile) -> str:
-    """Return, as a clause, how much of an unproved profile the evidence of this site has proved.
-
-    Evidence is about values. It proves no command.
-    """
+    """Return, as a clause, how much of an unproved profile the evidence of this site has proved."""
     proved = sum(parameter.confidence == "site" for parameter in profile.parameters)
-    if not proved:
+    orders = [order for chart in profile.data.charts for order in chart.orders]
+    followed = sum(order.confidence == "site" for order in orders)
+    if not proved and not followed:
         return "no drive has confirmed it"
-    return f"this site has proved {proved} of its {len(profile.parameters)} values and no command"
+    commands = f"{followed} of its {len(orders)} commands" if followed else "no command"
+    return f"this site has proved {proved} of its {len(profile.parameters)} values and {commands}"
 
 
 LONGEST_UNPACKED = 1 << 24

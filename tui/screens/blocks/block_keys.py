@@ -40,7 +40,7 @@ class BlockKeys(ArmingKeys):
     def action_exchange(self) -> None:
         """Write values through the outputs."""
         block_editor = self.block_editor
-        if not self._require_armed():
+        if not self._may_write():
             return
 
         try:

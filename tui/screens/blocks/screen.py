@@ -228,7 +228,7 @@ class BlocksScreen(BlockKeys):
         if wrong:
             self._refuse(wrong[0])
             return
-        if not self._require_armed():
+        if not self._may_write():
             return
 
         slots = "1 slot" if proposals.count == 1 else f"{proposals.count} slots"

@@ -94,6 +94,19 @@ class ArmingKeys(PanelScreen):
             self._refuse(self.session.arming.hindrance or self._how_to_arm())
         return self._armed()
 
+    def _is_unproved(self) -> bool:
+        return self.session.is_unconfirmed and not self.session.contradiction
+
+    def _may_write(self) -> bool:
+        """Return True if settings may be written; else report how to arm, or have a person confirm
+        a profile of which only the commands are proved."""
+        if not self._require_armed():
+            return False
+        if self._is_unproved():
+            self._confirm_profile()
+            return False
+        return True
+
     def _how_to_arm(self) -> str:
         other = self.session.line.facts.commander(self.session.device)
         if other is None:
@@ -116,7 +129,7 @@ class ArmingKeys(PanelScreen):
         if (other := self.session.line.facts.commander(self.session.device)) is not None:
             self._ask_for(other)
             return
-        if self.session.is_unconfirmed and not self.session.contradiction:
+        if self._is_unproved() and self.session.arming.barred:
             opened = self.app.opened
             if opened is None or opened.simulation is None or opened.line is not self.session.line:
                 self._confirm_profile()
@@ -140,7 +153,8 @@ class ArmingKeys(PanelScreen):
 
         def confirm(_stamp: int) -> None:
             self.session.confirm_profile()
-            self.app.tell(f"Confirmed until this program ends. {NOT_ARMED}")
+            next_step = "" if self._armed() else f" {NOT_ARMED}"
+            self.app.tell(f"Confirmed until this program ends.{next_step}")
 
         self._ask(
             f"Write to drive {self.session.device} by the unproved profile {profile.id}?",

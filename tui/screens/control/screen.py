@@ -363,7 +363,7 @@ class ControlSourceScreen(OrderKeys):
     def action_prove(self) -> None:
         """Ask, then test the drive's reaction to a communication loss."""
         latest = self.console.latest
-        if not self._require_armed() or latest is None:
+        if not self._may_write() or latest is None:
             return
         turning, watch = latest.state.motion in ENABLED_KINDS, self._watch()
         if not turning and watch is not None and (why := hidden_at_rest(watch.reaction)):
@@ -387,7 +387,7 @@ class ControlSourceScreen(OrderKeys):
             self._refuse("The configuration has not been read yet.")
         elif not found:
             self._refuse("Nothing to write: this configuration is active.")
-        elif self._require_armed():
+        elif self._may_write():
             codes = ", ".join(change.parameter.code for change in found)
             follows = (
                 f"Writes {codes}, each read back. A run command present at the new source"

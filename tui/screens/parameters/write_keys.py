@@ -189,7 +189,7 @@ class WriteKeys(ParameterKeys):
         if not edits:
             self.note("Nothing is staged.", "Press Enter to edit the parameter under the cursor.")
             return
-        if not self._require_armed():
+        if not self._may_write():
             return
 
         def work(stamp: int) -> None:
@@ -230,7 +230,7 @@ class WriteKeys(ParameterKeys):
         except DriveError as refused:
             self._refuse(str(refused))
             return
-        if self._require_armed():
+        if self._may_write():
             wear = self.editor.wear_text() if work == self.editor.save else ""
             self._ask(question, "\n".join(filter(None, (effect, wear))), yes, "Cancel", work)
 

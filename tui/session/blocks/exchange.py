@@ -22,7 +22,7 @@ from tui.drive.settings.writable import AT_REST, is_order
 from tui.drive.shown import depends_on
 from tui.drive.values import check_raw, from_words, to_words
 
-from ..drive import DriveSession
+from ..drive import DriveSession, unproved_text
 from ..journal import Entry, Journal
 from ..read.retrying_reader import RetryingReader
 from ..settings.write import CUT_SHORT, NotTaken, Writer, parameter_entry, raw_text
@@ -61,7 +61,7 @@ async def exchange(
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
-    if why := permit.refusal():
+    if why := permit.refusal() or (unproved_text(session) if session.is_unconfirmed else ""):
         raise AssignmentRefused(f"{why} Nothing was written.")
     if outputs.block.effective == "after-reset" and not in_force:
         raise AssignmentRefused(

@@ -40,7 +40,7 @@ from tui.drive.shown import depends_on
 from tui.drive.values import from_words
 from tui.safety import CLIENT_WRITE_ARMED_FOR, JUST_READ
 
-from ..drive import DriveSession
+from ..drive import DriveSession, unproved_text
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import parameter_entry
@@ -124,7 +124,7 @@ class GatewayWrite:
         if drive is None or drive.profile.id != self._session.profile.id:
             self._refuse(BUSY, "another drive answers at this address")
         if self._session.is_unconfirmed:
-            self._refuse(ILLEGAL_FUNCTION, self._session.arming.barred)
+            self._refuse(ILLEGAL_FUNCTION, unproved_text(self._session))
         if any(word.kind is WordKind.UNKNOWN for word in words):
             lacking = [word.address for word in words if word.kind is WordKind.UNKNOWN]
             self._refuse(ILLEGAL_FUNCTION, f"no parameter can be written at {lacking}")

@@ -18,7 +18,8 @@ from tui.drive.settings.writable import is_setting
 from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, is_field, to_words, word_count
 
-from ..drive import DriveSession
+from ..arming import NotArmed
+from ..drive import DriveSession, why_unproved
 from ..journal import Entry, Journal, now_text
 from ..read.reader import Reader
 from ..reading import Reading
@@ -63,6 +64,8 @@ class Writer:
         session, code = self.session, parameter.code
         if self.permit is not None:
             self.permit.check()
+            if why := why_unproved(session, parameter, raw):
+                raise NotArmed(why)
             await self._read_scale(parameter)
         held = await self._held_word(parameter) if is_field(parameter) else None
         before = session.image.get(code)

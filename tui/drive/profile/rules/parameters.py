@@ -326,7 +326,14 @@ def fault_help(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def no_site(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Yield parameters that claim what only evidence of this site can prove."""
+    """Yield parameters and commands that claim what only evidence of this site can prove."""
+    for index, chart in enumerate(data.charts):
+        for place, order in enumerate(chart.orders):
+            if order.confidence == "site":
+                yield (
+                    ("charts", index, "orders", place, "confidence"),
+                    f"command {order.name}: site is proved by evidence, not by a profile.",
+                )
     for index, parameter in enumerate(data.parameters):
         if parameter.confidence == "site":
             yield (

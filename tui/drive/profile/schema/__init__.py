@@ -40,7 +40,14 @@ from .chart import (
     TeachableReference,
     Transition,
 )
-from .evidence import EvidenceDrive, EvidenceFinding, EvidenceResult, ProfileEvidence
+from .evidence import (
+    EvidenceDrive,
+    EvidenceFinding,
+    EvidenceKind,
+    EvidenceResult,
+    EvidenceSubject,
+    ProfileEvidence,
+)
 from .fault_help import (
     AlarmHelp,
     CauseRule,
@@ -165,7 +172,9 @@ __all__ = [
     "Erratum",
     "EvidenceDrive",
     "EvidenceFinding",
+    "EvidenceKind",
     "EvidenceResult",
+    "EvidenceSubject",
     "ExceptionCode",
     "FactoryBy",
     "FamilySearch",

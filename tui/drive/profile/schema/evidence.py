@@ -7,7 +7,10 @@ from typing import Literal
 from .base import Table
 
 EvidenceResult = Literal["confirmed", "contradicted", "open"]
-EvidenceSubject = Literal["identity", "address", "range", "value", "frame"]
+EvidenceSubject = Literal["identity", "address", "range", "value", "frame", "command", "reference"]
+
+
+EvidenceKind = Literal["drive", "simulated", "unknown"]
 
 
 class EvidenceDrive(Table, frozen=True, kw_only=True):
@@ -17,7 +20,7 @@ class EvidenceDrive(Table, frozen=True, kw_only=True):
     reference: str = ""
     firmware: str = ""
     """Version that the drive reports; empty if it reports none."""
-    kind: Literal["drive", "simulated", "unknown"]
+    kind: EvidenceKind
     """`drive` if a person said that it is a real one. Only then does the file prove anything."""
     link: str
     """Kind and settings of the line, without its name: RTU 19200 8E1."""
@@ -28,9 +31,12 @@ class EvidenceFinding(Table, frozen=True, kw_only=True):
 
     subject: EvidenceSubject
     """`address`: the parameter can be read there. `range`: its value is one that the profile lets
-    it have. `value`: the display shows the same value. `frame`: the reply has the printed form."""
+    it have. `value`: the display shows the same value. `frame`: the reply has the printed form.
+    `command`: the drive without its motor did what the command says. `reference`: its feedback
+    agreed with the reference."""
     name: str
-    """Code of the parameter, or the section of the manual with the frame; empty for the drive."""
+    """Code of the parameter, the section of the manual with the frame, or chart and command; empty
+    for the drive."""
     statement: str = ""
     """The statement as tested, so that a changed profile is not proved by it."""
     result: EvidenceResult
