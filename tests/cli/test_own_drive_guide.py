@@ -24,14 +24,14 @@ def blocks(kind: str) -> list[str]:
 async def test_guide_leads_from_the_table_to_a_motor_that_runs(tmp_path: Path) -> None:
     table = tmp_path / "my-drive.csv"
     table.write_text(blocks("csv")[0], encoding="utf-8")
-    commands, scale = blocks("toml")
+    commands, scale, frame = blocks("toml")
     begun = ended(0, "profiles", "new", "my-drive", "--from-csv", table)
     path = library.user_folder() / "my-drive.toml"
     assert str(path) in begun.stdout
     assert library.faults_of(path) == [], "valid from the first moment"
     text = path.read_text("utf-8")
     text = text.replace('code = "REF"\n', f'code = "REF"\n{scale}')
-    path.write_text(f"{text}\n{commands}", encoding="utf-8")
+    path.write_text(f"{text}\n{commands}\n{frame}", encoding="utf-8")
     library.load.cache_clear()
     ended(0, "profiles", "--check", path)
     ended(0, "profiles", "--prove", path)

@@ -42,7 +42,7 @@ def test_example_profile_is_found_loaded_and_decodes(folder: Path) -> None:
     assert (listing.id, listing.name, listing.parameters) == (
         "example-pump",
         "Example pump drive",
-        7,
+        9,
     )
     profile = library.load_file(listing.path)
     frequency = profile["FREQ"]
@@ -73,7 +73,7 @@ def test_own_profile_replaces_a_packaged_one(folder: Path) -> None:
 
 BROKEN = [
     # old text, new text, expected message
-    ('scale = "0.1"', 'scale = "a tenth"', "FREQ"),
+    ('"Hz"\nscale = "0.1"\naccess', '"Hz"\nscale = "a tenth"\naccess', "FREQ"),
     ("address = 101", "address = 100", "already belongs to STAT"),
     ('source = "guide 5.2"', 'source = "a book"', "does not begin with the id of a source"),
     ('parameter = "TRIP", rate', 'parameter = "TRIPP", rate', "no parameter 'TRIPP'"),

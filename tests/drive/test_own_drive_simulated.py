@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from tests.session.test_command import bench
 from tui.cli.main import main
 from tui.drive.profile import library
 from tui.session.connect.open_line import open_line
@@ -16,6 +17,7 @@ from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.read.reader import Reader
 from tui.simulator import DriveSpec, SimulatedDrive, Simulation
+from tui.simulator.proving.proof_steps import prove_profile
 
 README = Path(__file__).parents[2] / "profiles" / "README.md"
 ADDRESS = 5
@@ -43,6 +45,30 @@ def test_own_profile_is_checked_and_listed(own_file: Path) -> None:
     listed = CliRunner().invoke(main, ["profiles"])
     [line] = [text for text in listed.output.splitlines() if "(your own)" in text]
     assert line.startswith(PUMP)
+    assert library.hints_of(own_file) == []
+
+
+@pytest.mark.usefixtures("own_file")
+def test_own_profile_is_proved_with_its_frame_and_its_commands() -> None:
+    steps = {step.title: step.fault for step in prove_profile(library.load(PUMP))}
+    assert [title for title, fault in steps.items() if fault] == []
+    assert {
+        "frame 01 03 00 64 00 02 means FREQ = 20.0 Hz",
+        "reverse (Run reverse) leads to its state",
+        "stop stops from reverse",
+        "REF and FREQ agree",
+    } <= set(steps)
+
+
+@pytest.mark.usefixtures("own_file")
+async def test_own_profile_runs_and_stops_its_simulated_motor() -> None:
+    async with bench(PUMP) as made:
+        made.commander.run("reverse", "20Hz")
+        assert await made.done() == "Run reverse: Running"
+        assert made.writes() == [(301, 200), (300, 3)]
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+        assert made.writes()[-1] == (300, 0)
 
 
 def test_simulated_drive_keeps_its_functions_and_limits(own_file: Path) -> None:
