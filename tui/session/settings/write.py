@@ -64,8 +64,8 @@ class Writer:
         session, code = self.session, parameter.code
         if self.permit is not None:
             self.permit.check()
-            if why := why_unproved(session, parameter, raw):
-                raise NotArmed(why)
+            if unproved := why_unproved(session, parameter, raw):
+                raise NotArmed(unproved)
             await self._read_scale(parameter)
         held = await self._held_word(parameter) if is_field(parameter) else None
         before = session.image.get(code)
