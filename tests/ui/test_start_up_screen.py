@@ -10,6 +10,7 @@ from types import SimpleNamespace
 from typing import Any, Literal
 
 import pytest
+from rich.style import Style
 from textual.screen import ModalScreen
 
 from tui.bus.fake import FakeLine
@@ -258,3 +259,23 @@ def test_step_is_whole_on_every_screen(size: tuple[int, int]) -> None:
                 assert "Source: " in text, step.step
                 assert f"({step.confidence})" in text, step.step
             opened.go(1)
+
+
+def test_only_what_stands_out_is_bold() -> None:
+    """The style of the first sign must not be that of the whole line."""
+    opened = open_start_up(DriveSession(FakeLine(), 1, library.load("atv71")), "bold", None)
+    while not any(row.kind == "parameter" for row in opened.rows):
+        opened.go(1)
+    view = StartUpView(opened, library.load("atv71"), {}, {}, {}, 0.0, "", lambda *_: False)
+    lines = walk_lines(view, 120, 40)
+    assert not any(line.style for line in lines)
+    bold = [
+        text
+        for line in lines
+        for span in line.spans
+        if isinstance(span.style, Style)
+        and span.style.bold
+        and (text := line.plain[span.start : span.end].strip())
+    ]
+    assert 0 < len(bold) < 10
+    assert max(map(len, bold)) < 30, bold

@@ -157,7 +157,7 @@ def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) 
     slot, raw = view.slots[place], plan.raws[place]
     parameter = slot_target(block_editor.session.profile, block, raw)
     own = block_editor.session.profile[code]
-    first = Text(f" {code}", STRONG)
+    first = Text().append(f" {code}", STRONG)
     first.append(f"  {notation_text(own)}", FAINT)
     first.append("  " if raw == UNUSED else "  mapped to ", FAINT)
     if parameter is None:

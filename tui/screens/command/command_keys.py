@@ -70,7 +70,7 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
 
     def on_option_list_option_selected(self) -> None:
         """Show which keys answer, as Enter writes nothing."""
-        reported = Text("Press y or Esc.   ", ALARM)
+        reported = Text().append("Press y or Esc.   ", ALARM)
         self.tell_keys(reported.append_text(OPTION_HINT))
 
     def action_yes(self) -> None:

@@ -104,14 +104,14 @@ def _channel(profile: Profile, latest: Snapshot | None) -> str:
 
 def step_row(step: LineStep, *, staged: bool) -> Text:
     """Return the row of a step that makes this line a source."""
-    text = Text(" → ", ATTENTION, no_wrap=True)
+    text = Text(no_wrap=True).append(" → ", ATTENTION)
     text.append(capitalized(step.text), PLAIN)
     return text.append("   staged" if staged else "", ATTENTION)
 
 
 def source_row(source: ControlSource, *, active: bool) -> Text:
     """Return the row of a configuration, with a mark at the active one."""
-    text = Text(" ● " if active else " · ", STRONG if active else FAINT, no_wrap=True)
+    text = Text(no_wrap=True).append(*((" ● ", STRONG) if active else (" · ", FAINT)))
     text.append(source.name, STRONG if active else PLAIN)
     return text.append("   active" if active else "", FAINT)
 
@@ -123,7 +123,7 @@ def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) ->
     values = [(_named(profile, c, c.old), _named(profile, c, c.new)) for c in found]
     names = tuple(change.parameter.name for change in found)
     beside = CHANGE_CODE + len(" ") + max(len(f"{old} → {new}") for old, new in values)
-    room = max(CHANGE_NAME, min(width - beside, max(map(len, names))))
+    room = max(CHANGE_NAME, min(width - beside - 1, max(map(len, names))))
     fitted = fitted_names(names, room)
     return [
         _change(change, f"{fitted[name]:<{room}}", *texts, width)

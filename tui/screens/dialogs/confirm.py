@@ -129,5 +129,5 @@ class Confirm(Consequences[bool]):
         if not self._loses:
             self.answer(True)
             return
-        reported = Text("Press y or Esc.   ", ALARM)
+        reported = Text().append("Press y or Esc.   ", ALARM)
         self.tell_keys(reported.append_text(self._keys))

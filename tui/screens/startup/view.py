@@ -137,7 +137,7 @@ def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
         state = _state(view, step)
         sign, style = STEP_SIGNS[state]
         here = number == at + 1
-        text = Text(" ▸" if here else "  ", ATTENTION, no_wrap=True)
+        text = Text(no_wrap=True).append(" ▸" if here else "  ", ATTENTION)
         text.append(sign, style)
         name = f" {cut(plain(step.step), room)}" if width > STEP_NUMBERS_WIDTH else ""
         text.append(f" {number:>2}{name}", STRONG if here else PLAIN)
@@ -160,7 +160,7 @@ def _step(view: StartUpView, width: int, rows: int) -> list[Text]:
     start_up = view.start_up
     step = start_up.step
     sign, style = STEP_SIGNS[_state(view, step)]
-    head = Text(f"{sign} ", style, no_wrap=True)
+    head = Text(no_wrap=True).append(f"{sign} ", style)
     head.append(f"{start_up.index + 1} {plain(step.step)}", STRONG)
     top = [head, *(Text(line, style) for line in wrapped(state_text(view), width, 2))]
     task = [Text(line, PLAIN) for line in wrapped(plain(step.text), width, STEP_TASK_LINES)]
@@ -252,7 +252,7 @@ def _wrapped(label: str, text: str, width: int, most: int) -> list[Text]:
 def _row(view: StartUpView, row: StepRow, width: int, chosen: bool) -> Text:
     """Return one row: its sign, its name, its value."""
     record = view.start_up.record
-    text = Text("▸ " if chosen else "  ", ATTENTION, no_wrap=True)
+    text = Text(no_wrap=True).append("▸ " if chosen else "  ", ATTENTION)
     if row.kind in RESULT_LABELS:
         text.append(RESULT_LABELS[row.kind], PLAIN)
     elif row.kind == "turned":
@@ -299,9 +299,8 @@ def _label(view: StartUpView, row: StepRow) -> str:
 def _parameter(view: StartUpView, code: str, width: int) -> Text:
     parameter = view.profile[code]
     name, mark = parameter.name, "" if is_verified(parameter) else "?"
-    text = Text(f"{code + mark:<6}", STRONG).append(
-        f" {cut(name, max(NAME_WIDTH, width - 9 - 2 * VALUE_ROOM))} ", PLAIN
-    )
+    text = Text().append(f"{code + mark:<6}", STRONG)
+    text.append(f" {cut(name, max(NAME_WIDTH, width - 9 - 2 * VALUE_ROOM))} ", PLAIN)
     text.append_text(_value(view, code))
     if code in view.staged:
         text.append(f"  staged {view.staged[code]}", ATTENTION)
