@@ -25,9 +25,17 @@ Script = Callable[[bytes, int], Sequence[Step]]
 
 
 def honest_pdu(pdu: bytes) -> bytes:
-    """Correct reply of a drive whose every register contains its own address."""
+    """Correct reply of a drive whose every register contains its own address.
+
+    Of its coils and inputs, every second eight are set.
+    """
     address, count = int.from_bytes(pdu[1:3], "big"), int.from_bytes(pdu[3:5], "big")
     match pdu[0]:
+        case 1 | 2:
+            bits = (n // 8 & 1 for n in range(address, address + count))
+            number = sum(bit << place for place, bit in enumerate(bits))
+            data = number.to_bytes((count + 7) // 8, "little")
+            return bytes([pdu[0], len(data)]) + data
         case 3 | 23:
             words = (n.to_bytes(2, "big") for n in range(address, address + count))
             return bytes([pdu[0], 2 * count]) + b"".join(words)
@@ -56,8 +64,8 @@ def silent(_request: bytes, _count: int) -> Sequence[Step]:
 
 def request_length(data: bytes) -> int:
     """Length of the RTU request that begins with these bytes, 0 if there are too few."""
-    fixed = {3: 8, 4: 8, 6: 8, 8: 8, 17: 4, 43: 7}
-    counted = {16: 6, 23: 10}
+    fixed = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 8: 8, 17: 4, 43: 7}
+    counted = {15: 6, 16: 6, 23: 10}
     if len(data) < 2:
         return 0
     if data[1] in fixed:

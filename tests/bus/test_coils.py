@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from pymodbus.pdu import DecodePDU
 from pymodbus.pdu.bit_message import (
@@ -20,7 +22,7 @@ from tui.bus.coils import (
     single_read,
     write_request,
 )
-from tui.bus.errors import RequestRefused, request_text
+from tui.bus.errors import NoAnswer, RequestRefused, WrongReply, request_text
 from tui.bus.limits import Limits, send_refusal
 from tui.bus.model import Priority
 from tui.bus.requests import Read, ReadInput, Request, WriteMany, WriteOne
@@ -28,6 +30,9 @@ from tui.bus.rtu.exchange import RtuExchange
 from tui.bus.schedule.queue import Job
 from tui.bus.share.carried import request_form, request_from
 from tui.wire.frames import at_place, frame, wire_place
+
+from .conftest import BRISK, WIDE, OpenLine
+from .peer import PtyPeer, honest, honest_pdu, reply, silent
 
 ALL = Limits(
     frozenset({1, 2, 3, 5, 6, 15, 16}), 8, 8, 0, 0, max_read_1=16, max_read_2=12, max_write_15=4
@@ -194,3 +199,75 @@ def test_errors_name_coils() -> None:
     assert request_text(5, 7) == "function 5, coil 7"
     assert request_text(2, 7) == "function 2, input 7"
     assert request_text(6, 7) == "function 6, register 7"
+
+
+# On a line
+
+
+BITS_TOO = replace(
+    WIDE, functions=WIDE.functions | {1, 2, 5, 15}, max_read_1=24, max_read_2=24, max_write_15=8
+)
+OTHER_FUNCTION = {1: 2, 2: 1, 5: 6, 15: 16}
+
+
+def with_other_function(request: bytes, _count: int) -> list[bytes | float]:
+    """Reply as a drive would that was asked by another function for as many bytes."""
+    pdu = honest_pdu(request[1:-2])
+    return [frame(request[0], bytes([OTHER_FUNCTION[pdu[0]]]) + pdu[1:])]
+
+
+@pytest.mark.parametrize("function", [1, 2])
+async def test_line_takes_no_reply_of_another_function(function: int, open_line: OpenLine) -> None:
+    with PtyPeer(with_other_function) as peer:
+        line = open_line(peer.path, BRISK)
+        line.describe(1, BITS_TOO)
+        with pytest.raises(WrongReply, match="function"):
+            await line.read(1, 8, 3, function=function, priority=Priority.BACKGROUND)
+
+
+@pytest.mark.parametrize("values", [[1], [1, 0]])
+async def test_line_takes_no_acknowledgement_of_a_register_for_a_coil(
+    values: list[int], open_line: OpenLine
+) -> None:
+    with PtyPeer(with_other_function) as peer:
+        line = open_line(peer.path, BRISK)
+        line.describe(1, BITS_TOO)
+        with pytest.raises(WrongReply, match="function"):
+            await line.write(1, COIL + 8, values)
+        assert len([sent for sent in peer.requested(1) if sent[1] in (5, 15)]) == 1, "sent once"
+
+
+@pytest.mark.parametrize("echo", [True, False])
+async def test_coils_are_read_and_written_with_and_without_an_echo(
+    echo: bool, open_line: OpenLine
+) -> None:
+    with PtyPeer(honest, echo=echo) as peer:
+        line = open_line(peer.path, BRISK)
+        line.describe(1, BITS_TOO)
+        await line.write(1, COIL + 5, [1])
+        await line.write(1, COIL + 5, [1, 0])
+        assert (await line.read(1, 6, 4, function=1)).words == (0, 0, 1, 1)
+        # its reply begins like the request: 24 coils from 03xx on
+        assert (await line.read(1, 0x0300, 24, function=1)).words == (0,) * 8 + (1,) * 8 + (0,) * 8
+        assert (await line.read(1, 15, 2, function=2)).words == (1, 0)
+
+
+async def test_echo_of_a_coil_is_no_acknowledgement(open_line: OpenLine) -> None:
+    with PtyPeer(silent, echo=True) as peer:
+        line = open_line(peer.path, BRISK)
+        line.describe(1, BITS_TOO)
+        with pytest.raises(NoAnswer):
+            await line.write(1, COIL + 5, [0])
+
+
+async def test_late_reply_is_not_taken_for_other_inputs(open_line: OpenLine) -> None:
+    def late_once(request: bytes, count: int) -> list[bytes | float]:
+        return [0.3, reply(request)] if count == 0 else [reply(request)]
+
+    with PtyPeer(late_once) as peer:
+        line = open_line(peer.path, BRISK)
+        line.describe(1, BITS_TOO)
+        with pytest.raises(NoAnswer):
+            await line.read(1, 0, 3, function=2, priority=Priority.OPERATOR_WRITE)
+        found = await line.read(1, 8, 3, function=2, priority=Priority.OPERATOR_WRITE)
+        assert found.words == (1, 1, 1)

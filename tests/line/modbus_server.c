@@ -1,7 +1,7 @@
 /* A small Modbus server on libmodbus, for tests: `modbus_server tcp` or `modbus_server rtu PATH`.
  *
- * It holds the words of an Altivar 71 at address 2 that the tests read, says where it serves and
- * answers until it is ended. */
+ * It holds the words of an Altivar 71 at address 2 that the tests read, and the coils and inputs of
+ * tests/drive/coils.toml. It says where it serves, and answers until it is ended. */
 #include <arpa/inet.h>
 #include <errno.h>
 #include <modbus.h>
@@ -12,7 +12,7 @@
 #include <sys/socket.h>
 #include <unistd.h>
 
-enum { DEVICE = 2, WORDS = 16384 };
+enum { DEVICE = 2, WORDS = 16384, COILS = 32 };
 
 static void fail(const char *what)
 {
@@ -22,13 +22,15 @@ static void fail(const char *what)
 
 static modbus_mapping_t *words(void)
 {
-    modbus_mapping_t *map = modbus_mapping_new(0, 0, WORDS, 0);
+    modbus_mapping_t *map = modbus_mapping_new(COILS, COILS, WORDS, 0);
     if (map == NULL)
         fail("words");
     map->tab_registers[3201] = 0x0637;
     map->tab_registers[3202] = 425;
     map->tab_registers[9001] = 57;
     map->tab_registers[9020] = 1; /* ramps count tenths of a second */
+    map->tab_input_bits[0] = map->tab_input_bits[2] = 1;
+    map->tab_bits[1] = map->tab_bits[2] = 1; /* a command that runs a motor in reverse */
     return map;
 }
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tui.bus.coils import ReadCoils, ReadDiscrete, WriteCoil, WriteCoils
+from tui.bus.ended_exchange import EndedExchange
 from tui.bus.errors import RequestRefused
 from tui.bus.fake import FakeLine
 from tui.bus.link import SerialLink
@@ -31,11 +32,15 @@ from tui.session.journal import Journal
 from tui.session.listening.words import spans_of, words_read
 from tui.session.monitor.trend import Trend
 from tui.session.read.reader import Reader
+from tui.session.record.rebuilt_frames import frames_of
+from tui.session.record.schema import reply_row
 from tui.session.running.watching import outcome_of
 from tui.session.settings.write import NotTaken, Writer
 from tui.session.work import Outcome, OutcomeKind
-from tui.wire.frames import wire_place
-from tui.wire.observed.pairing import ObservedExchange
+from tui.simulator.ghost import GhostDrive, RecordedExchange
+from tui.wire.frames import frame, wire_place
+from tui.wire.observed.pairing import ObservedExchange, Pairing
+from tui.wire.observed.splitting import ObservedFrame
 
 from .test_command import Bench, bench
 
@@ -126,6 +131,8 @@ async def test_stop_by_an_internal_error_switches_the_coils_off(
     Stopper(line, journal).send_prepared(session, RuntimeError("test"))
     assert line.devices[1].words[COILS + 1] == 0
     assert line.requests[0] == STOP
+    (entry,) = journal.recent
+    assert (entry.code, entry.address, entry.new_raw, entry.new) == ("CTRL", 1, 0, "16#0")
 
 
 @pytest.mark.parametrize("named", [True, False])
@@ -137,6 +144,8 @@ async def test_drive_that_is_not_identified_is_stopped_by_its_named_profile_only
     done = await stop_first(line, 1, journal, [stop_profile_of(profile)], names, "stop")
     assert [item.answer for item in done.sent] == (["ok"] if named else [])
     assert line.devices[1].words[COILS + 1] == (not named)
+    entries = [(entry.code, entry.address, entry.new) for entry in journal.recent]
+    assert entries == ([("CTRL", 1, "16#0")] if named else [])
 
 
 async def run(made: Bench, id: OrderId) -> Outcome | None:
@@ -225,6 +234,58 @@ def test_observed_frames_are_understood(
     assert [(s.function, s.address, s.count, s.written) for s in found] == spans
     exchange = ObservedExchange(0.0, 1, request[0], "ok", request, bytes.fromhex(reply))
     assert words_read(exchange) == read
+
+
+EXCHANGES = [
+    ("01 0001 0004", "01 01 05", "good"),
+    ("02 0000 0009", "02 02 01 01", "good"),
+    ("05 0010 FF00", "05 0010 FF00", "good"),
+    ("0F 0001 0004 01 05", "0F 0001 0004", "good"),
+    ("01 0001 0004", "81 02", "exception"),
+    ("0F 0001 0004 01 05", "8F 02", "exception"),
+]
+
+
+@pytest.mark.parametrize(("request_", "reply", "result"), EXCHANGES)
+def test_recorded_frames_are_those_of_the_line(request_: str, reply: str, result: str) -> None:
+    sent, came = bytes.fromhex(request_), bytes.fromhex(reply)
+    kind = "reply" if result == "good" else result
+    row = reply_row(EndedExchange(1, sent, kind, came, 1.0, 1.1, 100.0), "panel")
+    assert [frame.data for frame in frames_of(row)] == [sent, came]
+    assert (row.address, row.registers) == (sent[1] << 8 | sent[2], 1 if sent[0] == 5 else sent[4])
+
+
+def test_recorded_coils_are_words_of_a_register_each() -> None:
+    sent, came = bytes.fromhex("02 0000 0009"), bytes.fromhex("02 02 01 01")
+    row = reply_row(EndedExchange(1, sent, "reply", came, 1.0, 1.1, 100.0), "")
+    assert row.words == bytes.fromhex("0001 0000 0000 0000 0000 0000 0000 0000 0001")
+
+
+def test_ghost_answers_from_the_bits_that_it_has() -> None:
+    pairs = [(bytes.fromhex(r), bytes.fromhex(a)) for r, a, result in EXCHANGES[:2]]
+    ghost = GhostDrive(1, [RecordedExchange(0.0, 0.01, *pair) for pair in pairs])
+
+    def answer(pdu: str) -> str:
+        found = ghost.answer(bytes.fromhex(pdu))
+        return found.data.hex(" ") if found is not None else ""
+
+    assert answer("01 0001 0004") == "01 01 05"
+    assert answer("01 0003 0002") == "01 01 01", "coils 3 and 4"
+    assert answer("02 0001 0008") == "02 01 80"
+    assert answer("01 0000 0002") == "81 02"
+    assert answer("02 0001 0009") == "82 02"
+
+
+@pytest.mark.parametrize(
+    ("reply", "paired"),
+    [("01 01 05", True), ("01 02 05 00", False), ("02 01 05", False), ("03 02 0005", False)],
+)
+def test_observed_reply_has_the_bytes_of_its_coils(reply: str, paired: bool) -> None:
+    pairing = Pairing()
+    pairing.take(ObservedFrame(0.0, 0.01, frame(1, bytes.fromhex("01 0001 0004")), True))
+    taken = ObservedFrame(0.02, 0.03, frame(1, bytes.fromhex(reply)), True)
+    found, _ = pairing.take(taken)
+    assert [exchange.answer == "ok" for exchange in found] == [paired]
 
 
 async def test_refused_command_is_reported(profile: Profile) -> None:

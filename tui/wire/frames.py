@@ -38,6 +38,20 @@ def bits_of(data: bytes, count: int) -> tuple[int, ...]:
     return tuple(number >> index & 1 for index in range(count))
 
 
+def raw_of_words(place: int, words: Sequence[int]) -> int:
+    """Return the first of several words, or the number whose bits are these coils."""
+    if at_place(place)[0] in BIT_READS:
+        return int.from_bytes(packed_bits(words), "little")
+    return words[0]
+
+
+def written_text(place: int, words: Sequence[int]) -> str:
+    """Return words in hexadecimal; coils as one number."""
+    if at_place(place)[0] in BIT_READS:
+        return f"16#{raw_of_words(place, words):0{(len(words) + 3) // 4}X}"
+    return " ".join(f"16#{word:04X}" for word in words)
+
+
 MIN_FRAME = 4
 MAX_FRAME = 256
 """Bytes of the shortest and the longest frame, checksum included."""

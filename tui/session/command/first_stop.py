@@ -20,7 +20,7 @@ from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 from tui.drive.profile.stop_profile import StopProfile, stop_profile_of
 from tui.drive.sentences import any_of
-from tui.wire.frames import at_place
+from tui.wire.frames import BIT_READS, at_place, written_text
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
@@ -212,17 +212,21 @@ async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord
 
 
 def _entry(line: ModbusLine, device: int, what: FirstWord, answer: str) -> Entry:
+    function, address = at_place(what.address)
+    new = f"16#{what.word:0{4 * len(what.values)}X}"
+    if function in BIT_READS:
+        new = written_text(what.address, what.values)
     return Entry(
         time=now_text(),
         line=label(line.link),
         device=device,
         profile=",".join(family.id for family in what.families),
         code=what.code,
-        address=at_place(what.address)[1],
+        address=address,
         old_raw=None,
         old="",
         new_raw=what.word,
-        new=f"16#{what.word:0{4 * len(what.values)}X}",
+        new=new,
         answer=answer,
         read_back=None,
         why=FIRST_WHY,

@@ -15,7 +15,7 @@ from tui.bus.link import label
 from tui.drive.errors import DriveError
 from tui.drive.sentences import sentence
 from tui.drive.values import from_words
-from tui.wire.frames import at_place
+from tui.wire.frames import at_place, raw_of_words, written_text
 
 from ..carry_on import carried_on
 from ..drive import DriveSession
@@ -104,11 +104,11 @@ class LastStop:
                 continue
             function, address = at_place(place)
             parameter = session.profile.at(address, function)
-            code, word = str(address), values[0]
+            code, word = str(address), raw_of_words(place, values)
             if parameter is not None:
                 code, word = parameter.code, from_words(parameter, values)
                 session.image.doubt(code)
-            text = " ".join(f"16#{value:04X}" for value in values)
+            text = written_text(place, values)
             self._journal.add(
                 Entry(
                     now_text(), label(session.line.link), session.device, session.profile.id, code,

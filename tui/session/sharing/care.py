@@ -18,7 +18,7 @@ from tui.bus.requests import Request
 from tui.bus.shared_state import accepts_any_care
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile, unpacked_profile
-from tui.wire.frames import at_place
+from tui.wire.frames import at_place, raw_of_words, written_text
 
 from ..drive import CareData, DriveSession
 from ..journal import Entry, Journal, now_text
@@ -118,8 +118,8 @@ class DrivesInCare:
             address=address,
             old_raw=None,
             old="",
-            new_raw=words[0],
-            new=" ".join(f"16#{word:04X}" for word in words),
+            new_raw=raw_of_words(place, words),
+            new=written_text(place, words),
             answer="",
             read_back=None,
             why=f"sent for {program.text}, which has ended",
