@@ -129,17 +129,9 @@ class StatusWordField(DocumentPart):
     bits: list[str]
 
 
-class WatchedValueField(DocumentPart, kw_only=True):
+class WatchedValueField(ValueField, kw_only=True):
     """One value of a cycle; `time` is when it was read, null where it never was."""
 
-    address: int
-    raw: int | None
-    value: int | float | None
-    unit: str
-    text: str
-    taught: bool
-    quality: QualityText
-    unsure: bool | UnsetType = UNSET
     time: str | None
     error: str | None
 

@@ -12,7 +12,7 @@ import inspect
 import json
 import sys
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any
@@ -367,6 +367,19 @@ def profile_schema(form: str = "profile") -> dict[str, Any]:
         **reference,
         "$defs": dict(sorted(parts.items())),
     }
+
+
+def described_parts(tables: Sequence[type[Table]]) -> dict[str, Any]:
+    """Return the schemas of tables by their names, each field with the text below it."""
+    _, parts = msgspec.json.schema_components(tables, ref_template="#/$defs/{name}")
+    for table in tables:
+        shapes = parts[table.__name__]["properties"]
+        kinds = [kind for kind in table.__mro__[::-1] if issubclass(kind, Table)]
+        for kind in kinds[1:]:  # the first one is Table itself
+            names = dict(zip(kind.__struct_fields__, kind.__struct_encode_fields__, strict=True))
+            for field, text in texts_below(kind).items():
+                shapes[names[field]]["description"] = text
+    return parts
 
 
 def schema_text(form: str = "profile") -> str:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
-import msgspec
-
-from tui.drive.profile.json_schema import texts_below
+from tui.drive.profile.json_schema import described_parts
 from tui.drive.profile.schema import Table
 
 from .step_file import STEPS_KEY
@@ -17,12 +15,7 @@ from .steps import MOST_STEPS, STEP_KINDS, AcceptanceTest
 def acceptance_schema() -> str:
     """Return the schema as text, made from the tables into which a file is decoded."""
     tables: list[type[Table]] = [AcceptanceTest, *STEP_KINDS.values()]
-    _, parts = msgspec.json.schema_components(tables, ref_template="#/$defs/{name}")
-    for table in tables:
-        texts = {key: text for t in reversed(table.__mro__) for key, text in _texts(t).items()}
-        for name, shape in parts[table.__name__]["properties"].items():
-            if text := texts.get(name):
-                shape["description"] = text
+    parts = described_parts(tables)
     for kind, form in STEP_KINDS.items():
         parts[form.__name__]["properties"]["kind"] = {"const": kind}
     whole: dict[str, Any] = parts.pop(AcceptanceTest.__name__)
@@ -44,11 +37,3 @@ def _whole_numbers(value: Any) -> Any:
     if isinstance(value, list):
         return [_whole_numbers(part) for part in value]
     return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def _texts(table: type) -> dict[str, str]:
-    """Return the descriptions of a table's own fields, by their names in the file."""
-    if not (isinstance(table, type) and issubclass(table, Table)) or table is Table:
-        return {}
-    names = dict(zip(table.__struct_fields__, table.__struct_encode_fields__, strict=True))
-    return {names[field]: text for field, text in texts_below(table).items()}

@@ -14,7 +14,6 @@ from enum import StrEnum
 
 from tui.bus.api import Priority
 from tui.bus.errors import DeviceException
-from tui.bus.link import TcpLink, character_time, silence
 from tui.bus.poll_plan import USUAL_TURNAROUND
 from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, slot_target
 from tui.drive.blocks.wire_cost import span
@@ -24,6 +23,7 @@ from tui.drive.shown import depends_on, shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from ..drive import DriveSession
+from ..read.kept_plans import timing_on
 from ..read.proof import SURE, SlotEvidence, SlotMatch
 from ..read.retrying_reader import RetryingReader
 from ..reading import Reading
@@ -104,11 +104,8 @@ class BlockView:
 
 def wire_timing(session: DriveSession) -> WireTiming:
     """Return the time of an exchange, from the line's settings and measurements."""
-    link = session.line.link
-    turnaround = session.line.device_state(session.device).usual_turnaround or USUAL_TURNAROUND
-    if isinstance(link, TcpLink):
-        return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
-    return WireTiming(character_time(link), silence(link), turnaround)
+    usual = session.line.device_state(session.device).usual_turnaround
+    return timing_on(session.line.link, usual or USUAL_TURNAROUND)
 
 
 @dataclass(slots=True)

@@ -9,14 +9,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import msgspec
 from msgspec import Meta
 
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.converting import converted
 from tui.drive.profile.form import form_faults
-from tui.drive.profile.json_schema import texts_below
+from tui.drive.profile.json_schema import described_parts
 from tui.drive.profile.person_file import raise_faults, read_person_file
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import CablingMaster, CablingPart, LineSchematic, Table
@@ -270,17 +269,7 @@ def _station_faults(plan: LinePlan, station: PlanStation) -> Iterator[tuple[str,
 
 def plant_schema() -> str:
     """Return the JSON Schema of the file for editors, made from its tables."""
-    tables: list[type[Table]] = [PlantFile, PlanMaster, PlanStation]
-    _, parts = msgspec.json.schema_components(tables, ref_template="#/$defs/{name}")
-    for table in tables:
-        texts = {key: text for kind in table.__mro__[::-1] for key, text in _texts(kind).items()}
-        for name, shape in parts[table.__name__]["properties"].items():
-            if text := texts.get(name):
-                shape["description"] = text
+    parts = described_parts([PlantFile, PlanMaster, PlanStation])
     whole: dict[str, Any] = parts.pop(PlantFile.__name__)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return json.dumps({**head, **whole, "$defs": parts}, indent=2) + "\n"
-
-
-def _texts(kind: type) -> Mapping[str, str]:
-    return texts_below(kind) if issubclass(kind, Table) and kind is not Table else {}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Mapping
 
-from tui.bus.link import TcpLink, character_time, silence
+from tui.bus.link import Link, TcpLink, character_time, silence
 from tui.bus.poll_plan import USUAL_TURNAROUND, PlannedRead
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
 
@@ -38,7 +38,7 @@ class KeptPlans:
         if key not in self._kept:
             while len(self._kept) >= PLANS_KEPT:
                 del self._kept[next(iter(self._kept))]
-            profile, timing = self._session.profile, self._timing(turnaround)
+            profile, timing = self._session.profile, timing_on(self._session.line.link, turnaround)
             self._kept[key] = plan_reads(profile, sorted(codes), timing, slots, refused)
         return self._kept[key]
 
@@ -51,11 +51,12 @@ class KeptPlans:
             self._turnaround = round(measured / TURNAROUND_STEP) * TURNAROUND_STEP
         return self._turnaround
 
-    def _timing(self, turnaround: float) -> WireTiming:
-        link = self._session.line.link
-        if isinstance(link, TcpLink):
-            return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
-        return WireTiming(character_time(link), silence(link), turnaround)
+
+def timing_on(link: Link, turnaround: float) -> WireTiming:
+    """Return the time of an exchange; over Modbus TCP only the drive takes time."""
+    if isinstance(link, TcpLink):
+        return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
+    return WireTiming(character_time(link), silence(link), turnaround)
 
 
 def planned_read(request: ReadRequest) -> PlannedRead:
