@@ -62,10 +62,8 @@ class WriteLeases:
         if not known:
             self.disarm(device)
             self.end(self._me, device)  # or the care of before would count
-        self._say(device, self.grant(self._me, device, self._lease(device, until, known)))
-
-    def _lease(self, device: int, until: float | None, care: bytes) -> WriteLease:
-        return WriteLease(self._stops.stamp(device), until, care)
+        lease = WriteLease(self._stops.stamp(device), until, known)
+        self._say(device, self.grant(self._me, device, lease))
 
     def stay_armed(self, device: int, seconds: float | None) -> None:
         """Extend the lease of a device that this program has armed, to so many seconds from now."""

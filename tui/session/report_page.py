@@ -6,7 +6,6 @@ Its forms are Markdown, HTML that prints on one A4 page, and text.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from datetime import datetime
 from html import escape
 from pathlib import Path
 from textwrap import wrap
@@ -305,7 +304,7 @@ def _settings(parts: ReportParts) -> ReportSection:
 def _tests(parts: ReportParts, results: Sequence[StoredResult]) -> ReportSection:
     rows = [
         (
-            _local(result.begun, parts),
+            f"{result.begun.astimezone(parts.zone):%Y-%m-%d}",
             result.name,
             "PASSED" if result.passed else f"NOT PASSED. {result.why_not or ''}".rstrip(),
             result.steps_text,
@@ -352,7 +351,3 @@ def _limited(section: ReportSection, most: int) -> ReportSection:
         return section
     more = counted(left, "1 more is not shown.", "{count} more are not shown.")
     return section._replace(rows=section.rows[:most], note=f"{section.note} {more}".strip())
-
-
-def _local(time: datetime, parts: ReportParts) -> str:
-    return f"{time.astimezone(parts.zone):%Y-%m-%d}"

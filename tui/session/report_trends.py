@@ -19,7 +19,7 @@ from .monitor.trend import readout_parameter
 from .record.columns import reach_of_points
 from .record.decoding import HistoryPoint
 from .record.history import History, read_history
-from .record.runs import RecordedRun, RecordedTrip, history_of, read_events
+from .record.runs import RecordedRun, history_of, read_events
 from .report import trips_of
 
 SECONDS_BEFORE_TRIP, SECONDS_AFTER_TRIP = 60.0, 10.0
@@ -52,7 +52,8 @@ def report_trends(
     `entries` are those of the drive in the journal; `now` is in seconds since 1970. It reads files.
     """
     shown = history_of(read_events(files), device, profile.id, now - RUN_SOUGHT_FOR, now)
-    trip = max((*_journal_trips(entries), *_seen_trips(shown.trips)), default=None)
+    seen = ((trip.begun, trip.code, trip.name) for trip in shown.trips if trip.within is not None)
+    trip = max((*_journal_trips(entries), *seen), default=None)
     found = [
         _trip(files, device, profile, *trip) if trip else None,
         _run(files, device, profile, shown.runs[-1]) if shown.runs else None,
@@ -65,10 +66,6 @@ def _journal_trips(entries: Iterable[Entry]) -> Iterator[tuple[float, str, str]]
     for trip in trips_of(entry for entry in entries if entry.kind == "fault")[-1:]:
         with suppress(ValueError, OverflowError):
             yield datetime.fromisoformat(trip.tripped).timestamp(), trip.code, trip.name
-
-
-def _seen_trips(trips: Iterable[RecordedTrip]) -> Iterator[tuple[float, str, str]]:
-    return ((trip.begun, trip.code, trip.name) for trip in trips if trip.within is not None)
 
 
 def _trip(
@@ -113,7 +110,8 @@ def _trend(
         return found if found.unit == unit else History(())
 
     frequency, current = read("output_frequency", "Hz"), read("motor_current", "A")
-    sign = -1.0 if reverse and not _is_signed(frequency) else 1.0
+    is_signed = frequency.entry is not None and is_signed_type(frequency.entry)
+    sign = -1.0 if reverse and not is_signed else 1.0
     points = list(_points(frequency.points, current.points, sign))
     if len(points) < 2:
         return None
@@ -121,10 +119,6 @@ def _trend(
     remark = "Values older than an hour are means over up to 10 s." if reduced else ""
     reach = reach_of_points(frequency.points)
     return ReportTrend("run", "", RunCurve(profile, points), reach, remark)
-
-
-def _is_signed(history: History) -> bool:
-    return history.entry is not None and is_signed_type(history.entry)
 
 
 def _points(

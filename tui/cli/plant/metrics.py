@@ -125,9 +125,8 @@ def metrics_text(lines: Sequence[LineReport], version: str, now: float) -> str:
     parts: list[str] = []
     for metric, samples in by_metric.items():
         if samples:
-            kind, help = METRICS.get(metric) or MetricHead(
-                "gauge", f"Values in {_unit_of(metric)}."
-            )
+            unit = metric.removeprefix("value_").replace("_", " ")
+            kind, help = METRICS.get(metric) or MetricHead("gauge", f"Values in {unit}.")
             parts += [f"# HELP {PREFIX}_{metric} {help}\n# TYPE {PREFIX}_{metric} {kind}\n"]
             parts += [_written(sample) for sample in samples]
     return "".join(parts)
@@ -139,10 +138,6 @@ def value_metric(unit: str) -> tuple[str, Decimal]:
         return "value", Decimal(1)
     end, factor = BASE_UNITS.get(unit, ("", "1"))
     return f"value_{end or _NO_NAME.sub('_', unit.lower()).strip('_') or 'other'}", Decimal(factor)
-
-
-def _unit_of(metric: str) -> str:
-    return metric.removeprefix("value_").replace("_", " ")
 
 
 def _written(sample: MetricSample) -> str:

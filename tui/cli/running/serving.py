@@ -53,7 +53,7 @@ class Service:
 
     def ready(self, status: str) -> None:
         """Everything that was asked for is served."""
-        self._tell(f"READY=1\nSTATUS={_one_line(status)}")
+        self._tell(f"READY=1\nSTATUS={' '.join(status.split())}")
 
     def stopping(self) -> None:
         """The end was begun."""
@@ -94,10 +94,6 @@ def _watchdog_seconds(environment: Mapping[str, str]) -> float | None:
     if not text.isdecimal() or not int(text) or (pid and pid != str(os.getpid())):
         return None
     return int(text) / 1e6
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())
 
 
 PULSE_INTERVAL = 0.5
@@ -288,9 +284,6 @@ def _warn(wish: GatewayWish, host: str, port: int) -> None:
     """Warn if other computers can reach the gateway."""
     if is_loopback(host):
         return
-    text = _OPEN_AS_ALLOWED if _allows(wish.rules) else _OPEN_TO_READ
+    allows = wish.rules.writes or wish.rules.commands
+    text = _OPEN_AS_ALLOWED if allows else _OPEN_TO_READ
     say(f"drivepanel: {text.format(place=written_host_port(host, port))}", err=True)
-
-
-def _allows(rules: GatewayRules) -> bool:
-    return bool(rules.writes) or rules.commands

@@ -137,7 +137,8 @@ def _resolved(ctx: click.Context, text: str) -> str:
         usual["profile_id"] = lambda: _profile_here(ctx, named)
         device_prefix = "" if named.device is None else f"{named.device}="
         usual["profile_ids"] = (f"{device_prefix}{named.profile}",)
-    ctx.default_map = {key: item for key, item in usual.items() if key in _names(ctx)}
+    names = {param.name for param in ctx.command.params}
+    ctx.default_map = {key: item for key, item in usual.items() if key in names}
     return named.line
 
 
@@ -162,10 +163,6 @@ def named_line_of(text: str, *, stops: bool = False) -> NamedLine | None:
         for fault in settings.faults:
             say(f"drivepanel: {fault}", err=True)
     return found
-
-
-def _names(ctx: click.Context) -> set[str | None]:
-    return {param.name for param in ctx.command.params}
 
 
 def _profile_here(ctx: click.Context, named: NamedLine) -> str | None:

@@ -164,7 +164,8 @@ def _step(view: StartUpView, width: int, rows: int) -> list[Text]:
     head.append(f"{start_up.index + 1} {plain(step.step)}", STRONG)
     top = [head, *(Text(line, style) for line in wrapped(state_text(view), width, 2))]
     task = [Text(line, PLAIN) for line in wrapped(plain(step.text), width, STEP_TASK_LINES)]
-    body = [_row(view, row, width, number == start_up.row) for number, row in _numbered(view)]
+    numbered = enumerate(start_up.rows)
+    body = [_row(view, row, width, number == start_up.row) for number, row in numbered]
     note = wrapped(plain(step.note), width, STEP_NOTE_LINES)
     # the task is never cut off, nor the note, which may be a warning: what the step reads and
     # writes gives way to them and to one line of the source, then the rows scroll
@@ -199,10 +200,6 @@ def _below(view: StartUpView, note: list[str], width: int, rows: int) -> list[Te
         lines = wrapped(fitted_names((source,), cells)[source], width, left) if left else []
     shown = [*note, *lines, *before]
     return [Text(line, FAINT) for line in shown[: max(0, rows)]]
-
-
-def _numbered(view: StartUpView) -> list[tuple[int, StepRow]]:
-    return list(enumerate(view.start_up.rows))
 
 
 def state_text(view: StartUpView) -> str:

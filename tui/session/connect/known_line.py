@@ -73,7 +73,7 @@ class KnownLine:
             now = _mark_of(identity, profile)
             if not any(now.stated) and not now.profile:
                 return
-            before = self._remembered().drives.get(device)
+            before = load_memory().lines.get(self._name.key, LineMark()).drives.get(device)
             self._found[device] = now
             reported = ""
             if before is not None and not before.fits(now):
@@ -102,9 +102,6 @@ class KnownLine:
         self._changed = {**others, what: reported} if reported and not self._accepts else others
         reason = f"Nothing is written to this line: {self.text} {self.way}"
         self._line.held = reason if self._changed else ""
-
-    def _remembered(self) -> LineMark:
-        return load_memory().lines.get(self._name.key, LineMark())
 
     def _adapter_changed(self, memory: LinesMemory) -> str:
         """Return how the adapter differs, as a sentence; empty if it does not."""

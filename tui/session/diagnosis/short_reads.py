@@ -90,7 +90,8 @@ class ShortReads:
             if number == clean and _sick(self.line) == sick and not self.swapped[0]:
                 break
             free = [item for item in shapes if now - item.missed >= held]
-            shape = min(free, key=lambda entry: entry.times) if free else _longest_ago(shapes)
+            rarest = min(free, key=lambda entry: entry.times, default=None)
+            shape = rarest or min(shapes, key=lambda entry: entry.missed)
             ask = shape.asks[shape.times % len(shape.asks)]
             shape.times += 1
             try:
@@ -171,10 +172,6 @@ def _delays(frames: Sequence[Frame], device: int) -> Iterator[float]:
         replied = before.direction == "out" and frame.direction == "in" and not frame.note
         if replied and device in (before.data[0], *before.data[TCP_HEAD : TCP_HEAD + 1]):
             yield frame.time - before.time
-
-
-def _longest_ago(shapes: Sequence[_Shape]) -> _Shape:
-    return min(shapes, key=lambda shape: shape.missed)
 
 
 def _shapes(reads: ShortReads) -> list[_Shape]:

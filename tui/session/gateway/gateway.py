@@ -158,7 +158,8 @@ class Gateway:
                 max_age=self._rules.fresh,
             )
         except RequestRefused as refused:
-            raise Unanswerable(_unsent(line.line, device), str(refused)) from refused
+            code = BUSY if device in line.line.facts.paused else ILLEGAL_VALUE
+            raise Unanswerable(code, str(refused)) from refused
         finally:
             if line.line.device_state(device).answers:
                 line.drives.find_out(device)
@@ -232,11 +233,6 @@ def _patience(line: ModbusLine, device: int) -> Priority:
     if state.next_try is not None:
         return Priority.POLL
     return Priority.OPERATOR_READ if state.heard is not None else Priority.BACKGROUND
-
-
-def _unsent(line: ModbusLine, device: int) -> int:
-    """Return the exception code for a read that the line did not send."""
-    return BUSY if device in line.facts.paused else ILLEGAL_VALUE
 
 
 def exception_of(error: LineError) -> int:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-from tui.drive.profile.schema import LineSchematic
 from tui.drive.sentences import all_of, counted
 
 from .plan_file import LinePlan, PlanMaster, PlanStation
@@ -84,10 +83,7 @@ class _Checks:
     def __init__(self, plan: LinePlan) -> None:
         self.plan, self.limits = plan, plan.schematic
         self.profile = plan.limits[0]
-        self.chapter = self._chapter(self.limits)
-
-    def _chapter(self, item: LineSchematic) -> str:
-        return f"{self.profile.name}: {item.source}"
+        self.chapter = f"{self.profile.name}: {self.limits.source}"
 
     def _finding(
         self, severity: Severity, subject: str, text: str, *stations: PlanStation, chapter: str = ""

@@ -45,7 +45,8 @@ def _what(reported: DecodedExchange, families: Families) -> str:
             return "a second answer to the same request: two devices at one address?"
         case "unasked":
             return "an answer without a request"
-    return f"{_drive_request_text(reported)}: {_trouble(reported)}".removeprefix(": ")
+    names = first_of(requested_names(reported), CODES_NAMED_AT_MOST, " ")
+    return f"{names}: {_trouble(reported)}".removeprefix(": ")
 
 
 def _trouble(reported: DecodedExchange) -> str:
@@ -59,10 +60,6 @@ def _trouble(reported: DecodedExchange) -> str:
 def _value_text(value: ObservedValue) -> str:
     arrow = "← " if value.written else ""
     return f"{value.code} {arrow}{value.value.display}"
-
-
-def _drive_request_text(reported: DecodedExchange) -> str:
-    return first_of(requested_names(reported), CODES_NAMED_AT_MOST, " ")
 
 
 def _identity_text(device: int, families: Families) -> str:

@@ -261,7 +261,8 @@ class _Work:
         if isinstance(error, LineLost):
             text = f"{edit.code} was not written: {strip_outcome_note(error)}"
             return Result(edit, EditOutcome.NOT_SENT, text, held)
-        silent = [] if self._has_exceptions else ["This family does not answer what it refuses."]
+        answers = self.session.profile.data.exceptions
+        silent = [] if answers else ["This family does not answer what it refuses."]
         text = f"{edit.code} was not accepted: {strip_outcome_note(error)}"
         text = " ".join([text, *silent, f"The drive is {self.retrying.headline}."])
         return Result(edit, EditOutcome.NOT_TAKEN, text, held)
@@ -271,10 +272,6 @@ class _Work:
         why = strip_outcome_note(error)
         text = f"{edit.code} may have been written: {why} Read it before you write it again."
         return Result(edit, EditOutcome.UNKNOWN, text)
-
-    @property
-    def _has_exceptions(self) -> bool:
-        return bool(self.session.profile.data.exceptions)
 
     def summary(self) -> Applied:
         """Combine all results with the edits that remain."""

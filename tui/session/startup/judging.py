@@ -71,11 +71,8 @@ class StepFacts(NamedTuple):
 
 def step_rows(step: GuideStep, record: StepRecord) -> list[StepRow]:
     """Return the rows of a step, in their order."""
-    return [*_work_rows(step, record), *(StepRow(kind, kind) for kind in _results())]
-
-
-def _results() -> tuple[RowKind, ...]:
-    return "done", "deficient", "skip"
+    results: tuple[RowKind, ...] = ("done", "deficient", "skip")
+    return [*_work_rows(step, record), *(StepRow(kind, kind) for kind in results)]
 
 
 def _work_rows(step: GuideStep, record: StepRecord) -> Iterator[StepRow]:
