@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import sqlite3
+import time
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from typing import Any
 import pytest
 
 from tests.programs import DRIVEPANEL, port_of, served, simulated
+from tui.cli.commands import record
 
 from .commands import ended, run, tcp_line
 
@@ -69,6 +71,31 @@ def test_nothing_is_recorded_without_a_trigger_that_fires(tmp_path: Path) -> Non
         arguments = ("-d", "2", "RFR", *SHORT, "--out", path, "--trigger", "fault", "--for", "0.5")
         run(0, "record", line, *arguments)
     assert rows(path) == []
+
+
+def test_disk_that_refuses_and_accepts_again_is_reported_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A full disk has room for a moment: that is not the end of it."""
+
+    class Disk:
+        path = tmp_path / "values.sqlite"
+        trouble = ""
+
+        def write(self) -> None:
+            pass
+
+    times = iter((101.0, 102.0, 103.0, 104.0, 130.0))
+    monkeypatch.setattr(time, "monotonic", lambda: next(times))
+    disk = Disk()
+    recording = record.Recording(None, disk)  # type: ignore[arg-type]
+    for disk.trouble in ("full", "", "full", "", ""):
+        recording._write()
+    reported = capsys.readouterr().err.splitlines()
+    assert reported == [
+        f"drivepanel: {disk.path} cannot be written: full. Trying again.",
+        f"drivepanel: {disk.path} is written again.",
+    ]
 
 
 @pytest.mark.sweep

@@ -8,7 +8,6 @@ import time
 from collections.abc import Coroutine, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -253,11 +252,13 @@ class Recording:
     file: RecordingFile | None = None
     fired: list[TriggerField] = field(default_factory=list)
     _places: list[tuple[int, Parameter]] = field(default_factory=list)
-    _complained: bool = False
+    _failed: float = 0.0
+    """When the disk last refused rows (monotonic); 0 if that was not reported."""
 
     async def run(self, opened: OpenLine, target: Target) -> None:
         """Record until the end that was typed."""
         from tui.bus.link import label
+        from tui.session.connect.recorded_line import recording_is_on
         from tui.session.recording.recording_file import RecordingFile, parameter_events
         from tui.session.recording.triggers import TriggeredRows, parse_trigger
 
@@ -269,7 +270,8 @@ class Recording:
         try:
             wish.path.unlink(missing_ok=True)
             program = opened.line.facts.me.text
-            report = partial(say, err=True)
+            # the recorder of a real line reports them, too
+            report = len if opened.is_real and recording_is_on() else _complain
             self.file = RecordingFile(wish.path, label(opened.line.link), program, report)
         except OSError as error:
             raise Failure(f"{wish.path}: {error.strerror or error}.", USAGE) from None
@@ -305,11 +307,17 @@ class Recording:
 
     def _write(self) -> None:
         assert self.file is not None
+        from tui.session.record.recorder import SETTLED_AFTER
+
         self.file.write()
-        if self.file.trouble and not self._complained:
-            text = f"{self.file.path} cannot be written: {self.file.trouble}. Trying again."
-            say(text, err=True)
-        self._complained = bool(self.file.trouble)
+        path, trouble, now = self.file.path, self.file.trouble, time.monotonic()
+        if trouble and not self._failed:
+            _complain(f"{path} cannot be written: {trouble}. Trying again.")
+        if trouble:
+            self._failed = now
+        elif self._failed and now - self._failed > SETTLED_AFTER:
+            self._failed = 0.0
+            _complain(f"{path} is written again.")
 
     async def _follow(self, drive: RecordedDrive) -> None:
         """Record the cycles of a drive."""
@@ -361,6 +369,10 @@ class Recording:
         if lost:
             why = self.file.trouble or "the disk was too slow"
             say(counted(lost, "1 value was lost: {why}.", _LOST, why=why), err=True)
+
+
+def _complain(text: str) -> None:
+    say(f"drivepanel: {text}", err=True)
 
 
 _RECORDED = "Recorded {count} values to {path}."
