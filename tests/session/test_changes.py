@@ -134,6 +134,12 @@ def test_reference_that_changes_has_its_extent_until_the_stop(folder: Path) -> N
     assert (run.least, run.most) == ("25.0 Hz", "40.0 Hz")
 
 
+def test_direction_of_a_run_is_that_of_the_motor_once_it_turns(folder: Path) -> None:
+    starts = [status(0, READY), *each_second(1, 3, FORWARD)]
+    write(folder, [*starts, *each_second(3, 9, REVERSE), status(9, READY)])
+    assert the_run(folder).direction == "reverse"
+
+
 @pytest.mark.parametrize(
     ("second", "function", "quality", "who"),
     [(9.5, 6, GOOD, PROGRAM), (9.5, 16, GOOD, PROGRAM), (9.5, 6, SILENT, ""), (-30, 6, GOOD, "")],

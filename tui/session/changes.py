@@ -326,7 +326,8 @@ def entry_text(entry: Entry) -> str:
             return f"{entry.code}: {entry.answer}"
         case _:
             change = f"{entry.old} -> {entry.new}" if entry.old else f"-> {entry.new}"
-            return f"{entry.code}: {change}  {entry.answer}  ({entry.why})"
+            why = f"  ({entry.why})" if entry.why else ""
+            return f"{entry.code}: {change}  {entry.answer}{why}"
 
 
 def run_text(run: RecordedRun) -> str:

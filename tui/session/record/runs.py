@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import sqlite3
 from bisect import bisect_left
+from collections import Counter
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import closing, suppress
 from dataclasses import dataclass, field
@@ -109,8 +110,8 @@ class _Span(NamedTuple):
     begun: float
     ended: float
     begin_within: float | None
-    word: int
-    """The first word of that kind."""
+    words: Counter[int]
+    """Words of that kind, with the number of their readings."""
     commanded: float = 0.0
     """End of the last reply that showed it running, not stopping."""
     mixed: bool = False
@@ -277,8 +278,8 @@ def _spans(
             if span is None:
                 first = point.end if rests else point.time
                 within = None if before is None else first - before.end
-                enabled = [word for word in words if kind_of(word) in wanted]
-                span = _Span(point.time, point.end, within, enabled[0])
+                span = _Span(point.time, point.end, within, Counter())
+            span.words.update(word for word in words if kind_of(word) in wanted)
             commanded = point.end if "running" in kinds else span.commanded
             span = span._replace(ended=point.end, commanded=commanded, mixed=rests)
         elif span is not None:
@@ -322,7 +323,7 @@ def _described(
     least, most = (least, most) if least != most else ("", "")
     return RecordedRun(
         device, profile.id, span.begun, span.ended, span.begin_within, span.end_within,
-        _direction(chart, span.word), at_begin, least, most, who,
+        _direction(chart, span.words), at_begin, least, most, who,
     )  # fmt: skip
 
 
@@ -330,11 +331,13 @@ def _time(point: HistoryPoint) -> float:
     return point.time
 
 
-def _direction(chart: Chart, word: int) -> str:
+def _direction(chart: Chart, words: Counter[int]) -> str:
+    """Return the direction of most words: a drive shows it only once the motor turns."""
     mark = chart.direction
     if mark is None or mark.parameter != chart.status:
         return ""
-    return "reverse" if word >> mark.bit & 1 == mark.reverse else "forward"
+    reverse = [count for word, count in words.items() if word >> mark.bit & 1 == mark.reverse]
+    return "reverse" if 2 * sum(reverse) >= words.total() else "forward"
 
 
 def _references(
