@@ -16,6 +16,7 @@ from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.read.reader import Reader
+from tui.session.work import OutcomeKind
 from tui.simulator import DriveSpec, SimulatedDrive, Simulation
 from tui.simulator.proving.proof_steps import prove_profile
 
@@ -69,6 +70,30 @@ async def test_own_profile_runs_and_stops_its_simulated_motor() -> None:
         made.stopper.stop([made.session])
         await made.let_go_until(lambda: made.stopped)
         assert made.writes()[-1] == (300, 0)
+
+
+@pytest.fixture
+def file_with_local_bit(own_file: Path) -> None:
+    local = 'command = "CTRL"\nlocal = { parameter = "STAT", bit = 9 }\n'
+    text = own_file.read_text("utf-8").replace('command = "CTRL"\n', local)
+    own_file.write_text(text, "utf-8")
+
+
+@pytest.mark.usefixtures("file_with_local_bit")
+async def test_drive_in_local_control_is_stopped_but_not_started() -> None:
+    async with bench(PUMP) as made:
+        made.drive.keypad["LOC"]()
+        made.commander.run("forward", "20Hz")
+        refused = "The drive is in local control (STAT bit 9): it is not commanded by Modbus."
+        assert refused in await made.done(OutcomeKind.REFUSED)
+        assert made.writes() == []
+        made.stopper.stop([made.session])
+        await made.let_go_until(lambda: made.stopped)
+        assert made.writes() == [(300, 0)]
+        made.drive.keypad["REM"]()
+        await made.arm()
+        made.commander.run("forward", "20Hz")
+        assert await made.done() == "Run forward: Running"
 
 
 def test_simulated_drive_keeps_its_functions_and_limits(own_file: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from itertools import product
 
 from tui.drive.values import raw_range
 from tui.drive.words import type_bits, unsigned
@@ -59,14 +60,17 @@ def starts_by_mistake(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
                 )
 
 
+OTHER_BIT = "If another bit of it stops the motor, add the transition out of running."
+
+
 def _starts_besides(chart: Chart, order: Order, runs: list[Order]) -> str:
-    """Return why a stop or a reset would also start the motor; empty if it does not.
+    """Return why a command other than a start would start the motor; empty if it would not.
 
     The start bits are those in which a run command differs from the stop of the same register.
     On some drives, another bit of such a word stops the motor. A stop may contain them if a
     transition with it leads out of a running state, or if it is followed by the stop of all states.
     """
-    if order.id not in (*SURE_STOPS, "reset"):
+    if order.id in (*RUN_ORDERS, "dc-braking"):
         return ""
     states = {state.id: state for state in chart.states}
     stopping = {
@@ -76,7 +80,10 @@ def _starts_besides(chart: Chart, order: Order, runs: list[Order]) -> str:
         and _is(states, step.source, "running")
         and not _is(states, step.target, "running")
     }
-    for run, stop in ((run, stop) for run in runs for stop in chart.orders if stop.id == "stop"):
+    stops = [stop for stop in chart.orders if stop.id == "stop"] or [
+        stop for stop in chart.orders if stop.id in SURE_STOPS
+    ]
+    for run, stop in product(runs, stops):
         code = run.parameter or chart.command
         registers = {way.parameter or chart.command for way in (order, stop)}
         if registers != {code} or not stop.words or stop.when not in ([], run.when):
@@ -84,12 +91,14 @@ def _starts_besides(chart: Chart, order: Order, runs: list[Order]) -> str:
         last, kept = unsigned(run.words[-1]), _option_bits(chart, code)
         start = (last ^ unsigned(stop.words[-1])) & ~kept
         for word in map(unsigned, order.words):
-            declared = order.id != "reset" and (word in stopping or bool(order.states))
+            is_stop = order.id in (*SURE_STOPS, "emergency-stop")
+            declared = is_stop and (word in stopping or bool(order.states))
             if start & last and not (word ^ last) & start and not declared:
-                return (
+                text = (
                     f"its word {word:#06x} contains the start bits {start:#06x}, in which"
-                    f" {run.id} differs from stop, so it would run the motor."
+                    f" {run.id} differs from {stop.id}, so it would run the motor."
                 )
+                return f"{text} {OTHER_BIT}" if is_stop else text
     return ""
 
 
