@@ -129,12 +129,14 @@ class ArmingKeys(PanelScreen):
         if (other := self.session.line.facts.commander(self.session.device)) is not None:
             self._ask_for(other)
             return
-        if self._is_unproved() and self.session.arming.barred:
-            opened = self.app.opened
+        if self._is_unproved():
+            opened, barred = self.app.opened, self.session.arming.barred
             if opened is None or opened.simulation is None or opened.line is not self.session.line:
-                self._confirm_profile()
-                return
-            self.session.confirm_profile()
+                if barred:
+                    self._confirm_profile()
+                    return
+            else:
+                self.session.confirm_profile()
         stamp, stroke = self.session.work.stops, self.app.stroke
         if stroke is not None and stroke.stamp != self.app.stop_stamp():
             return  # a stop came while the key went through the screen

@@ -97,7 +97,7 @@ def command_findings(session: DriveSession, result: AcceptanceResult) -> list[Ev
             name=name,
             statement=statement,
             result=_shown(step, whole=whole),
-            seen=" ".join(check.text for check in step.checks) or step.text,
+            seen=" ".join(check.text for check in step.checks if check.limit) or step.text,
         )
         for step in result.steps
         if (found := _tested(profile, chart, step.step)) is not None

@@ -93,10 +93,10 @@ class LineCalls:
             known = identity.profile or self._opened.profiles.get(address)
             if known is None:
                 fits = identity.candidates or [item.id for item in library.listings()]
-                raise DriveError(
-                    f"Device {address} does not identify itself. Name its profile:"
-                    f" {', '.join(fits)}."
-                )
+                text = f"Device {address} does not identify itself."
+                if identity.reference:
+                    text = f"Device {address} answers as {identity.reference!r}."
+                raise DriveError(f"{text} Name its profile: {', '.join(fits)}.")
             found = library.load(known)
         else:
             found = library.load(profile)
