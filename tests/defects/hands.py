@@ -44,9 +44,9 @@ DEFECTS = (
     ),
     Defect(
         "unreached-stop-is-silent",
-        "tui/screens/key_dispatcher.py",
-        '            self.events.add("failed", text)\n            self.unreached = text,',
-        "            _ = text,",
+        "tui/screens/app_port.py",
+        '    panel.events.add("failed", text)\n    panel.unreached = text,',
+        "    _ = text,",
         "F9 stops all but one drive without reporting that one.",
         ("tests/ui/test_stop_keys.py",),
     ),
