@@ -312,13 +312,14 @@ def _show_wiring(profile: Profile, as_json: bool) -> None:
 
 _FUNCTIONS = {
     (False, False): "{of.code:>2}  {of.name}",
-    (True, False): "{of.code:>2}  {of.name}, at most {of.max_read} words read, past that {above}",
-    (False, True): "{of.code:>2}  {of.name}, at most {of.max_write} words written, past that"
+    (True, False): "{of.code:>2}  {of.name}, at most {of.max_read} {unit} read, past that {above}",
+    (False, True): "{of.code:>2}  {of.name}, at most {of.max_write} {unit} written, past that"
     " {above}",
-    (True, True): "{of.code:>2}  {of.name}, at most {of.max_read} words read and {of.max_write}"
-    " words written, past that {above}",
+    (True, True): "{of.code:>2}  {of.name}, at most {of.max_read} {unit} read and {of.max_write}"
+    " {unit} written, past that {above}",
 }
 """By whether a function has a limit of the words that it reads and writes."""
+_UNITS = {1: "coils", 2: "inputs", 15: "coils"}
 _ABOVE_LIMIT = {True: "no answer", False: "an exception"}
 """By whether the drive is silent above the limit."""
 
@@ -338,7 +339,8 @@ def _show(profile: Profile, as_json: bool) -> None:
     )
     for function in profile.data.functions:
         text = _FUNCTIONS[bool(function.max_read), bool(function.max_write)]
-        text = text.format(of=function, above=_ABOVE_LIMIT[function.past_limit == "silence"])
+        above = _ABOVE_LIMIT[function.past_limit == "silence"]
+        text = text.format(of=function, above=above, unit=_UNITS.get(function.code, "words"))
         screen.print(f"  function {text}", highlight=False)
     rows = []
     for parameter in profile.parameters:

@@ -28,7 +28,7 @@ from ..read.reader import Reader
 log = logging.getLogger(__name__)
 
 READ_THROUGH = Limits(
-    functions=frozenset({1, 2, 3, 4, 43}),
+    functions=frozenset({1, 2, 3, 4, 17, 43}),
     max_read=MAX_READ,
     max_read_1=MAX_READ,
     max_read_2=MAX_READ,
