@@ -7,8 +7,33 @@ from .defect import Defect
 FAULTS = "tests/bus/test_faults.py"
 QUEUE = "tests/bus/test_queue.py"
 IN_STEP = "tests/bus/test_in_step.py"
+COILS = "tests/bus/test_coils.py"
 
 DEFECTS = (
+    Defect(
+        "bits-after-the-last-coil-ignored",
+        "tui/bus/expectation.py",
+        "return 0 if last and last[0] & self.padding else self.length",
+        "return self.length",
+        "The reply to a read of more coils is taken for one of fewer.",
+        (f"{COILS}::test_another_reply_is_never_taken",),
+    ),
+    Defect(
+        "coil-has-the-place-of-a-register",
+        "tui/wire/frames.py",
+        "return SPACES.index(function) * SPACE_SIZE + address",
+        "return address",
+        "A command for a coil is written to the register of the same number.",
+        (f"{COILS}::test_place_decides_what_is_written",),
+    ),
+    Defect(
+        "coils-polled-as-registers",
+        "tui/session/read/kept_plans.py",
+        "return PlannedRead(request.address, request.count, request.function)",
+        "return PlannedRead(request.address, request.count)",
+        "The holder of a line shows registers as the coils of the same numbers.",
+        ("tests/session/test_coils.py::test_holder_of_the_line_polls_by_the_same_functions",),
+    ),
     Defect(
         "checksum-not-checked",
         "tui/bus/rtu",

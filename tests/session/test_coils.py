@@ -93,6 +93,13 @@ async def test_coils_and_inputs_are_read_as_words(profile: Profile) -> None:
     assert set(line.requests) == {ReadDiscrete(1, 0, 3), ReadCoils(1, 1, 4), ReadCoils(1, 16, 1)}
 
 
+def test_holder_of_the_line_polls_by_the_same_functions(profile: Profile) -> None:
+    session = DriveSession(FakeLine({1: dict(DRIVE)}), 1, profile)
+    planned = Reader(session).planned(["STAT", "CTRL", "FREQ"])
+    reads = {(read.function, read.address, read.count) for read in planned}
+    assert reads == {(2, 0, 3), (1, 1, 4), (3, 1, 1)}
+
+
 async def test_coil_is_written_and_read_back(profile: Profile, journal: Journal) -> None:
     line = FakeLine({1: dict(DRIVE)})
     session = session_of(line, profile)
