@@ -21,6 +21,7 @@ from tui.bus.shared_state import SharedState
 from tui.screens.base import PanelScreen
 from tui.screens.connection.scanning import UNPROBED
 from tui.screens.dialogs.ask import Ask
+from tui.screens.frame_source import not_stopped_texts
 from tui.screens.key_dispatcher import NOBODY_TO_STOP, SCAN_STOPS
 from tui.session.command.commander import Commander
 from tui.session.command.stop_report import Phase
@@ -324,12 +325,13 @@ async def test_not_stopped_message_is_never_covered() -> None:
 async def test_stop_of_all_during_a_scan_stops_drives_that_it_finds_afterwards(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    take = Fleet.take
+    take, reported = Fleet.take, list[str]()
 
     def take_and_stop(self: Fleet, session: DriveSession, *found: Any, **how: Any) -> DriveConsole:
         console = take(self, session, *found, **how)
         if session.device == 1:
             assert app.take_stop_key("f9")  # only this drive is known yet
+            reported.extend(not_stopped_texts(app, app.panel_clock.monotonic()))
         return console
 
     monkeypatch.setattr(Fleet, "take", take_and_stop)
@@ -338,13 +340,14 @@ async def test_stop_of_all_during_a_scan_stops_drives_that_it_finds_afterwards(
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: app.fleet is not None and len(app.fleet.stopper.reports) == 2)
         assert app.fleet is not None
-        texts = [event.text for event in app.events.events]
-        assert any(text.startswith(f"{SCAN_STOPS} Addresses not reached yet: ") for text in texts)
+        assert SCAN_STOPS in [event.text for event in app.events.events]
+        assert any("NOT STOPPED YET, addresses " in text for text in reported), reported
         stopper = app.fleet.stopper
         await until(pilot, lambda: stopper.reports[2].phase in (Phase.STOPPING, Phase.STOPPED))
         assert app.fleet.search is not None
         await until(pilot, lambda: app.fleet.search.ended == "done")  # type: ignore[union-attr]
-        assert not [event for event in app.events.events if "No stop was sent" in event.text]
+        assert not [event for event in app.events.events if "NOT STOPPED" in event.text]
+        assert not_stopped_texts(app, app.panel_clock.monotonic()) == ()
 
 
 async def test_scan_that_ends_early_after_a_stop_of_all_names_what_it_has_not_reached() -> None:
@@ -356,7 +359,7 @@ async def test_scan_that_ends_early_after_a_stop_of_all_names_what_it_has_not_re
         search.stops_found, search._probed = True, 11
         app.connection._report_unprobed(search)
         assert app.events.newest is not None
-        assert app.events.newest.text == UNPROBED.format("12-31")
+        assert app.events.newest.text == app.unreached[0] == UNPROBED.format("12-31")
 
 
 async def test_drive_found_without_a_profile_after_a_stop_of_all_is_reported() -> None:

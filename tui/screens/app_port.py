@@ -211,7 +211,11 @@ UNREACHED = (
 
 
 def tell_unreached(panel: Panel, devices: Sequence[int]) -> None:
-    """Report drives that a stop of all does not reach, over every screen."""
-    text = UNREACHED.format(", ".join(map(str, devices)))
+    """Report drives without a profile, which a stop of all does not reach."""
+    tell_not_stopped(panel, UNREACHED.format(", ".join(map(str, devices))))
+
+
+def tell_not_stopped(panel: Panel, text: str) -> None:
+    """Report what a stop of all does not reach, over every screen."""
     panel.events.add("failed", text)
     panel.unreached = text, panel.panel_clock.monotonic()

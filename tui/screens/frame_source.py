@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from rich.style import Style
@@ -48,10 +48,19 @@ def not_stopped_texts(app: Panel, now: float) -> tuple[str, ...]:
             if report is not None and is_not_stopped(report, session, now):
                 why = report.text.removeprefix(NOT_STOPPED)
                 found.append(f"NOT STOPPED, {line}drive {session.device}: {why}")
+        if fleet.search is not None and fleet.search.is_stopping and fleet.search.unprobed:
+            found.append(f"NOT STOPPED YET, {line}{scan_stops_text(fleet.search.unprobed)}")
     text, since = app.unreached
     if text and now - since < FAILED_SHOWN:
         found.append(text)
     return tuple(found)
+
+
+def scan_stops_text(unprobed: Sequence[int]) -> str:
+    """Return what a scan that stops each drive has still to do."""
+    from tui.session.connect.addresses import addresses_text
+
+    return f"addresses {addresses_text(unprobed)}: the scan goes on, and stops each drive found."
 
 
 def is_not_stopped(report: StopReport, session: DriveSession, now: float) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping
 from contextlib import suppress
 from functools import partial
 from typing import TYPE_CHECKING
@@ -44,7 +44,6 @@ NOBODY_IN_REPLAY = "Nothing was stopped: this is a replay, and no line is open."
 LIVE_STOPPED = "Stopping all drives of the live lines. The drives on this screen are a replay."
 NO_COMMAND_IN_REPLAY = "This is a replay: nothing is sent to a drive."
 SCAN_STOPS = "Stopping all drives. The scan goes on, and stops each drive that it finds."
-NOT_REACHED_YET = f"{SCAN_STOPS} Addresses not reached yet: {{}}."
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
 TYPED_BEFORE = "Key ignored: it was typed while {} was being opened. Press it again."
@@ -215,8 +214,8 @@ class KeyDispatcher(HarmlessKeys):
         if strangers:
             tell_unreached(self, strangers)
         searches = [fleet.search for fleet in self.live_fleets if fleet.search is not None]
-        if scans := [search for search in searches if search.is_stopping]:
-            self._warn(_scan_text([device for scan in scans for device in scan.unprobed]))
+        if any(search.is_stopping for search in searches):
+            self._warn(SCAN_STOPS)
         elif strangers:
             return
         elif not any(others.values()) and not any(fleet.sessions for fleet in self.live_fleets):
@@ -325,13 +324,6 @@ def _stop_found(fleet: Fleet) -> None:
     """Have a scan in progress stop each drive that it finds from now on."""
     if fleet.search is not None:
         fleet.search.stops_found = True
-
-
-def _scan_text(unprobed: Sequence[int]) -> str:
-    """Return the report on a stop of all during a scan, with the addresses not probed yet."""
-    from tui.session.connect.addresses import addresses_text
-
-    return NOT_REACHED_YET.format(addresses_text(unprobed)) if unprobed else SCAN_STOPS
 
 
 def _stop_others(fleet: Fleet, stopped: dict[Fleet, Collection[int]]) -> None:

@@ -19,7 +19,7 @@ from tui.session.connect.line_key import line_key
 from tui.session.connect.named_lines import profile_named
 from tui.session.paths import remember_addresses
 
-from ..app_port import tell_unreached
+from ..app_port import tell_not_stopped, tell_unreached
 from .advice import ALARM_KIND
 from .state import LineView
 
@@ -32,8 +32,9 @@ if TYPE_CHECKING:
 
 NONE_AT_ADDRESS = "No drive answered at address {} (2 attempts)."
 NONE_AT_ADDRESSES = "No drive answered at addresses {} (2 attempts)."
-UNPROBED = "No stop was sent to addresses {}: the scan ended before it reached them."
-SCAN_AGAIN = "Press s to scan, then F9."
+UNPROBED = (
+    "NOT STOPPED: addresses {}. The scan ended before it reached them. Press s to scan, then F9."
+)
 COMPARE_WITH_BACKUP = "Press Ctrl+D on this drive to compare. Nothing is written."
 WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
 NO_SCAN_IN_REPLAY = "This is a replay: it has the drives of its record."
@@ -102,7 +103,7 @@ class Scanning(LineView):
         from tui.session.connect.addresses import addresses_text
 
         if search.stops_found and search.unprobed:
-            self.say(UNPROBED.format(addresses_text(search.unprobed)), SCAN_AGAIN, ALARM_KIND)
+            tell_not_stopped(self.app, UNPROBED.format(addresses_text(search.unprobed)))
 
     async def _carry_out(self, fleet: Fleet, search: Search, typed: str, *, once: bool) -> None:
         """Carry out a scan to its end, and report its result."""
