@@ -19,6 +19,7 @@ from tui.drive.profile.stop_profile import stop_profile
 from tui.session.diagnosis.evidence import DiagnosticEvidence
 from tui.session.diagnosis.next_steps import end_silence
 from tui.session.drive import DriveSession
+from tui.simulator import DriveSpec, Simulation
 from tui.simulator.proving.proof_steps import prove_profile
 
 FILES = sorted((library.packaged_folder() / library.PUBLIC).glob("*.toml"))
@@ -144,7 +145,9 @@ def test_proved_profile_needs_no_confirmation() -> None:
 def test_command_without_a_person_reads_but_does_not_write() -> None:
     read = CliRunner().invoke(main, ["read", "sim:ms300", "-p", "ms300", "2103H"])
     assert read.exit_code == 0, read.output
-    run = CliRunner().invoke(main, ["write", "sim:v20", "-p", "v20", "P1120=5", "--arm"])
+    with Simulation([DriveSpec("v20", 1)]) as simulation:
+        line = "tcp:{}:{}".format(*simulation.serve_tcp())
+        run = CliRunner().invoke(main, ["write", line, "-p", "v20", "P1120=5", "--arm"])
     assert run.exit_code == 5, run.output
     assert "drivepanel profiles new NAME --from v20" in run.output
 
