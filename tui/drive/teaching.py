@@ -239,18 +239,3 @@ def _sign_text(scale: TaughtScale) -> str:
             " of the display."
         )
     return "It has a sign." if scale.signed else "It has no sign."
-
-
-__all__ = [
-    "SCALES",
-    "UNITS",
-    "DisplayLook",
-    "Lesson",
-    "LessonKind",
-    "TaughtScale",
-    "learn",
-    "parse_display",
-    "scales_that_fit",
-    "taught_by",
-    "unit_named",
-]
