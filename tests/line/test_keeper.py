@@ -357,7 +357,7 @@ def test_next_keeper_polls_for_programs_of_a_killed_keeper() -> None:
             times: list[float] = []
 
             def note(snapshot: Snapshot) -> None:
-                if monitor._steady.received is not None and not snapshot.error:
+                if monitor.steady.received is not None and not snapshot.error:
                     times.append(snapshot.readings["ETA"].time)
 
             monitor.listen(note)

@@ -82,6 +82,10 @@ class PolledTurn:
             raise found
         return found if found.time > after else None
 
+    def take_more(self, read: PlannedRead) -> Reply | None:
+        """The reply to a read beyond the plan, as `take`; None if the program must send it."""
+        return None
+
 
 class Subscription:
     """One plan that the holder of the line carries out; used in the line's loop.

@@ -26,9 +26,12 @@ from .fleet import Fleet
 from .journal import Entry, Journal
 from .monitor.fault_record import SECONDS_KEPT
 from .monitor.line_watch import GLANCE
+from .monitor.monitor import codes_of_state
 from .monitor.trend import Trend
+from .read.reader import Reader
 from .reading import Origin, Reading
 from .record.newest import ends_of_cycles
+from .record.repeated_cycles import RepeatedCycles, cycles_of
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from .record.runs import history_of, read_events
 from .record.schema import EventRow, to_microseconds
@@ -50,12 +53,10 @@ OTHER_PROFILE = (
     " differently."
 )
 NO_PROFILE = "Drive {device}: {error} Its values are not shown."
-STEP_MARGIN = 0.03
-"""Seconds from the end of a recorded cycle to that of the replay: the recorded ones vary."""
 MOST_SOUGHT = 500
-"""Replies in which they are sought."""
-SOUGHT_PAUSES = 5
-"""Periods before the time of a replay in which its cycles are sought."""
+"""Replies in which a recorded cycle is sought."""
+SOUGHT_WITHIN = 5
+"""Periods in which it is sought."""
 LONGER_THAN_LEAD = 1000.0
 """Seconds between the checks of drives before a replay begins: samples replace them."""
 SAME_TRIP_WITHIN = 5_000_000
@@ -118,8 +119,7 @@ def take_drives(line: ReplayLine, fleet: Fleet) -> list[str]:
         session = DriveSession(line, device, profile, identity, line.clock)
         session.arming.barred = REPLAY_SENDS_NOTHING
         session.reads_blocks = False
-        # reads cost nothing here: a slow value is shown as soon as it was read then
-        fleet.take(session).monitor.slow_factor = 1
+        fleet.take(session).monitor.steady.recorded = RepeatedCycles(line, device)
         if named.hash and named.hash != digest_of(profile):
             reported.append(OTHER_PROFILE.format(device=device, profile=id))
     return reported
@@ -193,16 +193,22 @@ def _trips_in_lead(line: ReplayLine, device: int | None) -> bool:
 
 
 def in_step(line: ReplayLine, device: int | None, since: float, period: float) -> float:
-    """Return a time from `since` on at which cycles of a period end as the recorded ones do.
+    """Return when the first recorded cycle of a device from `since` on ended; `since` without one.
 
-    `since` itself if the reads of a device have no pauses before the time of the replay.
+    The monitor of a replay begins then, and repeats those that follow.
     """
     if device is None:
         return since
-    replies = line.last_before(device, line.at - SOUGHT_PAUSES * period, line.at, MOST_SOUGHT)
-    if not (ends := ends_of_cycles(replies[::-1], line.at)):
-        return since
-    return since + (ends[-1] + STEP_MARGIN - since) % period
+    until = min(since + SOUGHT_WITHIN * period, line.at)
+    replies = line.last_before(device, since, until, MOST_SOUGHT)
+    return next(iter(ends_of_cycles(replies[::-1], until)), since)
+
+
+def _first_read(line: ReplayLine, session: DriveSession) -> float:
+    """Return when the state of a drive was first read: the program of the record began then."""
+    reads = Reader(session).planned(codes_of_state(session.profile))
+    cycles, _ = cycles_of(line, session.device, line.clock.begin, reads)
+    return cycles[0].last.ended / 1e6 if cycles else line.clock.begin
 
 
 async def pass_lead(
@@ -234,6 +240,7 @@ async def pass_lead(
         past = watch.recorded[console.device] = RecordedCycles(line, console)
         curve = await asyncio.to_thread(recall_past, past, watch, events, since, monitored)
         await line.do(partial(_resume, console, curve), f"curve of {console.device}")
+        console.recorder.since = await asyncio.to_thread(_first_read, line, console.session)
     if shown is not None:
         await line.run_to(begin, EXACT_TAKES)
         monitor(shown)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from itertools import chain, pairwise
@@ -23,7 +24,7 @@ from .reading import Origin, Reading
 from .record.newest import PAUSE_OF_CYCLES, ends_of_cycles
 from .record.replay_line import ReplayLine
 from .record.replay_reader import RecordedReply
-from .record.schema import GOOD, REFUSED
+from .record.schema import GOOD, REFUSED, to_microseconds
 
 PAST_SECONDS, RECENT_SECONDS = 600.0, 60.0
 """Seconds of a curve before the replay, and of the last part of it, which Line shows."""
@@ -134,18 +135,19 @@ class RecordedCycles:
         """Return the replies that ended after `since`, those of a pause after `until` included."""
         end = until + PAUSE_OF_CYCLES
         found = self.line.last_before(self.console.device, since, end, MOST_OF_CURVE)
-        return [reply for reply in reversed(found) if reply.ended > since * 1e6]
+        return [reply for reply in reversed(found) if reply.ended > to_microseconds(since)]
 
     def cycles(self, replies: Sequence[RecordedReply], until: float) -> Iterator[Look]:
         """Yield the values at the end of each cycle that read those of the curve, or failed."""
         for reply, following in pairwise([*replies, None]):
             assert reply is not None
-            if reply.ended > until * 1e6:
+            if reply.ended > to_microseconds(until):
                 return
             self._take(reply)
-            pause = None if following is None else (following.sent - reply.ended) / 1e6
-            if (pause is None or pause > PAUSE_OF_CYCLES) and self._is_of_curve():
-                yield self._look_at(reply.ended / 1e6 + AFTER_REPLY)
+            pause = math.inf if following is None else (following.sent - reply.ended) / 1e6
+            is_end = pause > PAUSE_OF_CYCLES or (following is not None and self._has(following))
+            if is_end and self._is_of_curve():
+                yield self._look_at(reply.ended / 1e6)
 
     def checks(self, until: float) -> Iterable[Look]:
         """Return the cycles that follow the curve of the drive, up to a time."""
@@ -157,9 +159,12 @@ class RecordedCycles:
     def rest(self, now: float, period: float) -> float:
         """Return the seconds to the end of the recorded cycle that is about a period later."""
         near = period * NEAR_PERIOD
-        replies = self.replies(now + period - near, now + period + near)
-        ends = ends_of_cycles(replies, now + period + near)
-        return ends[0] + AFTER_REPLY - now if ends else period
+        until = now + period + near
+        replies = self.replies(now + period - near, until)
+        last = [reply.ended / 1e6 for reply in replies[-1:]]  # a pause follows it, too
+        ends = [*ends_of_cycles(replies, until), *(end for end in last if end <= until)]
+        # other reads of the drive may come before the check
+        return ends[-1] + AFTER_REPLY - now if ends else period
 
     def sample(self, at: float) -> Look | None:
         """Return the values at a time; None if nothing was read shortly before it."""
@@ -183,6 +188,14 @@ class RecordedCycles:
             shape = reply.function, reply.address, reply.registers
             self._new.pop(shape, None)
             self._new[shape] = reply
+
+    def _has(self, reply: RecordedReply) -> bool:
+        """Return True if a value of the curve in a reply was read since the last look."""
+        new, following = (
+            {place.parameter.code for shape in shapes for place in self._of(shape)}
+            for shapes in (self._new, [(reply.function, reply.address, reply.registers)])
+        )
+        return not new.isdisjoint(following & self._curves)
 
     def _is_of_curve(self) -> bool:
         failed = self._newest is not None and self._newest.quality > REFUSED

@@ -123,7 +123,7 @@ class FaultsScreen(OrderKeys):
             codes += reset_codes(self.session.profile)
         if (place := view.stored_place) is not None and place < len(faults.stored):
             codes += faults.stored[place]
-        if self._unread:
+        if self._unread or self.app.replay is not None:  # the next read of it may be due now
             codes += [*faults.history, *(code for stored in faults.stored for code in stored)]
         if not codes:
             return

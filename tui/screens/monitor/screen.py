@@ -320,6 +320,7 @@ class ViewSource:
             word=word,
             lean=app.low_bandwidth,
             me=session.line.facts.me.text,
+            replayed=app.replay is not None,
         )
 
     def _fault_at(self) -> str:

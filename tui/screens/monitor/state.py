@@ -123,6 +123,8 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
         return Text("stopped", STRONG), [Text(short(state.name, width), FAINT)]
     hindrance = view.control.hindrance
     if view.stands_by and hindrance is None:
+        if view.replayed:
+            return Text("standby", STRONG), []
         if why := "read-only: no commands" if view.read_only else view.control.barred:
             return Text("standby", STRONG), [Text(line, FAINT) for line in wrapped(why, width, 2)]
         armed = view.control.armed_for is not None

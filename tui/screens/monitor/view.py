@@ -75,6 +75,8 @@ class View:
     """True on a low-bandwidth link: few parts change with each refresh."""
     me: str = ""
     """Name of this program among those on the line."""
+    replayed: bool = False
+    """True in a replay: its bar shows why nothing can be commanded."""
 
     def reading(self, code: str) -> Shown | None:
         """Return a reading with its quality at this moment; None if there is none."""

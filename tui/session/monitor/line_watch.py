@@ -380,7 +380,8 @@ class LineWatch:
         with self._changing:
             if self._kept.get(kept.session.device) is kept:
                 self._keep_alive(kept, found.watch.timeout if found.watch else unknown)
-        return LEARN_AGAIN
+        # reads of a replay cost nothing, and the program of the record had times of its own
+        return GLANCE if kept.session.device in self.recorded else LEARN_AGAIN
 
 
 def _glance_codes(profile: Profile) -> list[str]:

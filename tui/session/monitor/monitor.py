@@ -69,8 +69,6 @@ class Monitor:
         self.profile = session.profile
         self.period = 0.5
         """Target cycle time in seconds; a change applies from the next cycle on."""
-        self.slow_factor = SLOW_FACTOR
-        """Number of cycles in which each slow value is read once; set before `start`."""
         self.pause_reason: Callable[[], str] = lambda: ""
         """Returns why the drive must not be polled now; empty to poll it.
 
@@ -79,7 +77,7 @@ class Monitor:
         self.freely: Callable[[], bool] = lambda: True
         """Returns True if the keeper may read cycles without a call of `pause_reason` for each."""
         self.reader = Reader(session)
-        self._steady = SteadyCycles(session, self.reader)
+        self.steady = SteadyCycles(session, self.reader)
         self.restarts = 0
         """Number of restarts after an internal error."""
         self._latest: Snapshot | None = None
@@ -248,12 +246,12 @@ class Monitor:
     async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
         begun: deque[float] = deque(maxlen=RATE_OVER)
-        due = Rotation(self.slow_factor)
+        due = Rotation(SLOW_FACTOR)
         self._all_due = True
         cycle = failures = 0
         try:
             while True:
-                started = self._steady.begun
+                started = self.steady.begun
                 cycle += 1
                 error, contact = "", CONTACT_MADE
                 period = self._period(rates)
@@ -266,10 +264,10 @@ class Monitor:
                     if why := self.pause_reason():
                         raise PollHeldBack(why)
                     seldom = (*rates.seldom, *self.session.followed)
-                    turn = self._steady.turn(due, seldom)
+                    turn = self.steady.turn(due, seldom)
                     readings.update(await self._cycle(rates, readings, turn))
                 except (LineError, DriveError) as fault:
-                    self._steady.end()
+                    self.steady.end()
                     error, contact = str(fault), contact_of(fault)
                     failures += 1
                     if contact == "swapped":
@@ -290,13 +288,15 @@ class Monitor:
                 if not error:
                     await self._learn(cycle)
                     self._block_notes.note(used=bool(self._using))
-                    if await self._goes_on(rates, due, started + period):
-                        continue
-                self._steady.end()
-                rest = started + period - self.session.clock.monotonic()
-                await self.session.clock.sleep(period if error else max(0.0, rest))
+                begin = (self.session.clock.monotonic() if error else started) + period
+                codes = (*rates.fast, *rates.seldom)
+                goes_on = await self.steady.next_recorded(codes, begin, period)
+                if goes_on or (not error and await self._goes_on(rates, due, begin)):
+                    continue
+                self.steady.end()
+                await self.session.clock.sleep(max(0.0, begin - self.session.clock.monotonic()))
         finally:
-            self._steady.end()
+            self.steady.end()
             self.line.pace.release(self)
 
     async def _goes_on(self, rates: Rates, due: Rotation, at: float) -> bool:
@@ -305,12 +305,12 @@ class Monitor:
             return False
         seldom = (*rates.seldom, *self.session.followed)
         plan = SteadyPlan(rates.fast, seldom, max(self.period, SHORTEST_PERIOD))
-        return await self._steady.next(plan, due, at)
+        return await self.steady.next(plan, due, at)
 
     def _period(self, rates: Rates) -> float:
         """Return the target cycle time in seconds; longer if the line cannot keep it for all."""
         cost = self.reader.seconds(rates.fast)
-        cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR  # in a replay, too: as it was
+        cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
         return self.line.pace.claim(self, self.device, cost, max(self.period, SHORTEST_PERIOD))
 
     def _may_be_another(self, fault: Exception, failures: int) -> bool:
@@ -333,7 +333,7 @@ class Monitor:
         self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
     ) -> dict[str, Reading]:
         """Read the values of one cycle, and the details of the state if it has changed."""
-        codes, received = (*rates.fast, *turn), self._steady.received
+        codes, received = (*rates.fast, *turn), self.steady.received
         found = await self.reader.read(codes, priority=Priority.POLL, polled=received)
         self._using = self.reader.using
         if set(rates.changing) <= set(turn):
@@ -353,7 +353,7 @@ class Monitor:
         error: str,
         contact: Contact,
     ) -> None:
-        now = self._steady.ended(readings.values())
+        now = self.steady.ended(readings.values())
         aged = {
             code: reading.aged(now, stale_after(span, often=code in rates.fast))
             for code, reading in readings.items()

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 from tui.bus.errors import RequestRefused
 from tui.bus.poll_plan import (
     MOST_READS,
+    PlannedRead,
     PlannedTurn,
     PollCarrier,
     PolledTurn,
@@ -16,7 +18,7 @@ from tui.bus.poll_plan import (
 )
 
 from ..drive import DriveSession
-from ..read.reader import Reader
+from ..read.reader import Reader, sources_of
 from ..read.rotation import Rotation
 from ..reading import Reading
 
@@ -40,6 +42,13 @@ class SteadyPlan:
     period: float
 
 
+class CycleSource(Protocol):
+    """Cycles of a record, for a replay."""
+
+    async def next(self, reads: Sequence[PlannedRead], at: float, period: float) -> PolledTurn:
+        """Wait for the end of the next cycle of these reads; it is due `at` a time."""
+
+
 class SteadyCycles:
     """Has the keeper read a drive while the cycles stay the same.
 
@@ -59,11 +68,15 @@ class SteadyCycles:
         self._subscription: Subscription | None = None
         self._unfit = False
         """True if the keeper cannot carry out this plan."""
+        self.recorded: CycleSource | None = None
+        """Cycles of a replay, each with all its values; None on a live line."""
         self.received: PolledTurn | None = None
         """The cycle received from the keeper; None if this program reads the cycle."""
 
     def turn(self, due: Rotation, seldom: tuple[str, ...]) -> tuple[str, ...]:
         """Return the slow values of the current cycle."""
+        if self.recorded is not None:
+            return due.set_turn(seldom)  # as they were read then, whatever their rate
         if self.received is None or due.owes:
             return due.turn(seldom, self._reader.groups)
         index = (self.received.turn + self._shift) % len(self._turns)
@@ -82,6 +95,16 @@ class SteadyCycles:
             return self._clock.monotonic()
         times = (reading.time for reading in readings)
         return max((self._clock.line_time(self.received.ended), *times))
+
+    async def next_recorded(self, codes: Iterable[str], at: float, period: float) -> bool:
+        """Wait for the next cycle of a record; return False on a live line."""
+        if self.recorded is None:
+            return False
+        profile, known = self._reader.profile, tuple(codes)
+        sources = (source for code in known for source in sources_of(profile[code]))
+        reads = self._reader.planned((*known, *sources))
+        self.received = await self.recorded.next(reads, at, period)
+        return True
 
     async def next(self, plan: SteadyPlan, due: Rotation, at: float) -> bool:
         """Wait for the keeper's next cycle; return False if this program must read it."""

@@ -345,8 +345,10 @@ class Reader:
 
     async def _alone(self, parameter: Parameter, priority: Priority) -> Reading:
         count = word_count(parameter)
+        read = PlannedRead(parameter.address, count, parameter.function)
         try:
-            reply: Reply = await self.line.read(
+            more = self._polled.take_more(read) if self._polled is not None else None
+            reply = more or await self.line.read(
                 self.device,
                 parameter.address,
                 count,

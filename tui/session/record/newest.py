@@ -146,6 +146,8 @@ class NewestReplies:
         before = self._by_register.get(place)
         if before is not None and before.quality == GOOD != reply.quality:
             self._good[place] = before
+        elif reply.quality == GOOD:
+            self._good.pop(place, None)
         self._by_register[place] = _later(before, reply)
 
     def has(self, function: int, register: int) -> bool:

@@ -48,6 +48,8 @@ T = TypeVar("T")
 
 REPLAY_SENDS_NOTHING = "This is a replay: nothing is sent to a drive."
 COUNTED_EVERY = 1.0
+BEFORE_SECOND = 1e-5
+"""Seconds before the end of a second at which its exchanges are counted."""
 SILENT_AFTER = 2
 """Failed requests in a row after which any other one would have failed, too."""
 FRAMES_OF = 10.0
@@ -103,15 +105,7 @@ class ReplayLine(ReplayedRecord):
         """The state of the line at the time of the clock."""
         if self._closed:
             return LineState(LineStatus.CLOSED, "", self.clock.begin)
-        now = to_microseconds(self.clock.monotonic())
-        last = next((event for event in reversed(self._states) if event.utc <= now), None)
-        if last is None:
-            return LineState(LineStatus.CONNECTED, "", self.clock.begin)
-        status, _, reason = last.text.partition(" ")
-        with suppress(ValueError):
-            if (found := LineStatus(status)) in (LineStatus.LOST, LineStatus.CONNECTING):
-                return LineState(found, reason, last.utc / 1e6)
-        return LineState(LineStatus.CONNECTED, "", last.utc / 1e6)
+        return self.state_at(self.clock.monotonic())
 
     @property
     def trace(self) -> tuple[Frame, ...]:
@@ -174,10 +168,12 @@ class ReplayLine(ReplayedRecord):
                     task.cancel()
 
     async def _count(self) -> None:
-        """Count what ends, at its time."""
+        """Count what ends, in its second: the counts of the last minute are by seconds."""
         while True:
             self._count_all()
-            await self.clock.sleep(COUNTED_EVERY)
+            now = self.clock.monotonic()
+            following = (now + 2 * BEFORE_SECOND) // COUNTED_EVERY + 1
+            await self.clock.sleep(following * COUNTED_EVERY - BEFORE_SECOND - now)
 
     def close(self) -> None:
         """Close the line; may be called twice."""
@@ -220,7 +216,9 @@ class ReplayLine(ReplayedRecord):
         with self._reading():
             newest = self._of(device)
             if newest.last_failure is not None and newest.failures >= SILENT_AFTER:
-                raise newest.last_failure.error(device)  # as another request to it would have
+                # as another request to it would have failed
+                failure = newest.last_failure._replace(function=function, address=address)
+                raise failure.error(device)
             words, ended = newest.words(function, address, count)
         return Reply(words, ended / 1e6)
 

@@ -10,7 +10,7 @@ from functools import partial
 from pathlib import Path
 
 from tui.bus.errors import LineError, LineFailed
-from tui.bus.model import IdentificationObjects, Reply
+from tui.bus.model import IdentificationObjects, LineState, LineStatus, Reply
 from tui.bus.tally import Tally
 
 from .block_times import BlockTimes
@@ -65,6 +65,18 @@ class ReplayedRecord:
         by_now = [event for event in own if event.utc <= now]
         return by_now[-1] if by_now else own[0] if own else None
 
+    def state_at(self, time: float) -> LineState:
+        """Return the state of the line at a time of the record."""
+        at = to_microseconds(time)
+        last = next((event for event in reversed(self._states) if event.utc <= at), None)
+        if last is None:
+            return LineState(LineStatus.CONNECTED, "", self.clock.begin)
+        status, _, reason = last.text.partition(" ")
+        with suppress(ValueError):
+            if (found := LineStatus(status)) in (LineStatus.LOST, LineStatus.CONNECTING):
+                return LineState(found, reason, last.utc / 1e6)
+        return LineState(LineStatus.CONNECTED, "", last.utc / 1e6)
+
     def in_block(self, device: int, utc: int) -> Mapping[int, str]:
         """Return the codes by register of a device's block at a time in microseconds."""
         return self._blocks[device].at(utc)
@@ -93,6 +105,12 @@ class ReplayedRecord:
                 replies.append(found)
         return replies
 
+    def last_reply(self, device: int, function: int, address: int, count: int) -> Reply:
+        """Return the same of one place. Raises the error of its last read if there is none."""
+        with self._reading():
+            words, ended = self._of(device).last_words(function, address, count)
+        return Reply(words, ended / 1e6)
+
     @contextmanager
     def _reading(self) -> Iterator[None]:
         try:
@@ -107,6 +125,14 @@ class ReplayedRecord:
         try:
             with self._lock:
                 return self._reader.last_before(device, *span, most)
+        except sqlite3.Error:
+            return []
+
+    def replies_from(self, device: int, since: float) -> list[RecordedReply]:
+        """Return the next replies of a device whose requests were sent from a time on."""
+        try:
+            with self._lock:
+                return self._reader.replies_from(device, to_microseconds(since))
         except sqlite3.Error:
             return []
 

@@ -104,7 +104,8 @@ class WatchedValues:
         later = RetryingReader(self.session, Priority.BACKGROUND)
         follow = {code for p in profile.parameters for code in factory_sources(p)}
         rest = [*sorted(scale_sources(profile) | follow), *readable_codes(profile)]
-        parts = iter(neighbors(profile, dict.fromkeys(rest)))
+        all_parts = neighbors(profile, dict.fromkeys(rest))
+        parts, listed = iter(all_parts), self.session.clock.monotonic()
         waiting: list[tuple[str, ...]] = []
         while True:
             try:
@@ -118,6 +119,8 @@ class WatchedValues:
                     known, absent = self.raws, self.absent
                     left = [c for c in part if c not in known and c not in absent]
                     waiting = [tuple(group) for group in later.reader.groups(left)]
+                elif (now := self.session.clock.monotonic()) > listed + REREAD_AFTER:
+                    parts, listed = iter(all_parts), now  # in a replay, some follow later
                 else:
                     await self.session.clock.sleep(IDLE_POLL_INTERVAL)
                 self.trouble = ""
