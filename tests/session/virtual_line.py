@@ -20,7 +20,13 @@ from tui.bus.fake_device import FakeDevice
 from tui.bus.limits import CAUTIOUS, STANDARD_EXCEPTIONS
 from tui.bus.line_events import StateChanged
 from tui.bus.link import SerialLink
-from tui.bus.model import IdentificationObjects, LineState, LineStatus, Priority
+from tui.bus.model import (
+    IdentificationObjects,
+    LineCounters,
+    LineState,
+    LineStatus,
+    Priority,
+)
 from tui.bus.notes import LineNote
 from tui.bus.requests import Objects, Request
 from tui.bus.tally import Tally
@@ -73,12 +79,14 @@ class VirtualLine(FakeLine):
             self._note(note.kind, note.data.decode(), note.device)
         elif note.kind == EVENTS_OF_LINE:
             left = msgspec.msgpack.decode(note.data, type=LeftEvent)
-            _, device, kind, text = left.event
-            self._note(kind, text, device)
+            wall, device, kind, text = left.event
+            self._note(kind, text, device, wall)
 
-    def _note(self, kind: str, text: str, device: int | None = None) -> None:
-        now = to_microseconds(self.time.monotonic())
-        self._events.append(EventRow(now, now, device, kind, text))
+    def _note(
+        self, kind: str, text: str, device: int | None = None, wall: float | None = None
+    ) -> None:
+        at = to_microseconds(self.time.monotonic() if wall is None else wall)
+        self._events.append(EventRow(at, at, device, kind, text))
 
     def become(self, status: LineStatus, reason: str = "") -> None:
         """Lose the line, or regain it; the record has it."""
@@ -139,7 +147,15 @@ class VirtualLine(FakeLine):
             tally.count_good(device, was_heard=True)
         if isinstance(error, DeviceException):
             tally.count_exception(device, error.code)
-        self.counters = tally.frozen()
+
+    @property
+    def counters(self) -> LineCounters:
+        """The counts of this moment."""
+        return self._tally.frozen()
+
+    @counters.setter
+    def counters(self, value: LineCounters) -> None:
+        """Those of a plain fake line are not used."""
 
     def _decoded(self, request: Request, found: bytes | ExchangeError) -> Any:
         if isinstance(found, ExchangeError):
