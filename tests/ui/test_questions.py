@@ -21,10 +21,10 @@ from tui.screens.connection.rows import rows_of
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm, SaveOffer
-from tui.screens.dialogs.leave import Leave
+from tui.screens.dialogs.leave import LEAVE_KEYS, Leave
 from tui.screens.dialogs.now import MotorStates
 from tui.screens.dialogs.pick_file import PickFile
-from tui.screens.dialogs.question import Question, void_questions
+from tui.screens.dialogs.question import Question, hint, void_questions
 from tui.screens.frame_source import drive_now
 from tui.screens.keys.help import HelpScreen
 from tui.screens.parameters.screen import ParametersScreen
@@ -610,3 +610,12 @@ async def test_enter_on_control_says_why_there_is_no_question() -> None:
         await made.pilot.press("down", "enter")
         await until(made.pilot, lambda: "Not armed" in shown(made.app, "said"))
         assert writes(made.app) == []
+
+
+def test_label_of_a_key_is_not_split_over_two_lines() -> None:
+    text = hint(*LEAVE_KEYS, ("S", "Save first"))
+    assert text.plain.splitlines() == [
+        "s or Enter Stop and quit   l Leave it running and quit",
+        "Esc or q Stay   S Save first",
+    ]
+    assert hint(("y", "Write"), ("Esc or q", "Cancel")).plain == "y Write   Esc or q Cancel"

@@ -205,11 +205,18 @@ class KeyQuestion(Question[T]):
     NO_KEYS = "q,n"
 
 
+HINT_WIDTH = 66
+"""Cells of a line of keys in the widest dialog."""
+
+
 def hint(*keys: tuple[str, str]) -> Text:
-    """The line of keys of a dialog: each key with its label."""
-    text = Text()
+    """The lines of keys of a dialog: each key with its label, on one line."""
+    text, used = Text(), 0
     for key, does in keys:
-        text.append("   " if text else "")
+        cells = len(f"{key} {does}")
+        is_full = used + 3 + cells > HINT_WIDTH
+        text.append("" if not text else "\n" if is_full else "   ")
+        used = cells if is_full or not used else used + 3 + cells
         text.append(key, KEY)
         text.append(f" {plain(does)}", FAINT)
     return text
