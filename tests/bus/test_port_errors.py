@@ -19,7 +19,7 @@ from tui.bus.rtu.master import RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.trace import Trace
 from tui.bus.transport.port_errors import PortErrors, port_errors
-from tui.bus.transport.ports import latency_of, see_port
+from tui.bus.transport.ports import _is_no_port, latency_of, see_port
 
 from .conftest import BRISK
 from .peer import reply
@@ -92,6 +92,13 @@ async def test_added_request_is_counted_if_a_reply_fails(answered: bool) -> None
 
 def test_missing_port_is_seen_as_missing(tmp_path: Path) -> None:
     assert see_port(str(tmp_path / "none")).there is False
+
+
+@pytest.mark.parametrize(
+    ("path", "is_none"), [("/dev/null", True), (__file__, True), ("/dev/nowhere", False)]
+)
+def test_file_or_null_device_is_recognized_as_no_port(path: str, is_none: bool) -> None:
+    assert _is_no_port(path) == is_none
 
 
 def test_port_without_permission_names_its_group(

@@ -69,11 +69,12 @@ def test_counters_with_an_unknown_program_can_be_encoded() -> None:
 
 
 def test_look_answer_names_programs_but_not_the_keeper() -> None:
-    programs = [Program("k", KEEPER, 1), Program("a", "watch\n", 3), Program("b", "serve", 2)]
+    programs = [Program("k", KEEPER, 1), Program("a", "watch\n", 3), Program("b", "serve" * 9, 2)]
     minute = LastMinute(good=9, lost=1)
-    answer = look_answer(programs, {"b": 0.5, "k": 0.1}, minute)
+    answer = look_answer(programs, {"b": 0.51239, "k": 0.1}, minute)
     found = msgspec.json.decode(answer, type=LineLook)
-    assert found.clients == [LineClient("serve", 2, 0.5), LineClient("watch?", 3, 0.0)]
+    name = f"{'serve' * 7}serv…"
+    assert found.clients == [LineClient(name, 2, 0.512), LineClient("watch?", 3, 0.0)]
     assert found.minute == minute
 
 

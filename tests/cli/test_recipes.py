@@ -7,10 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from tui.bus.fake import FakeLine
+from tui.cli.commands import backup
+from tui.cli.shared.options import Target
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import ParameterSet, SetHead
 from tui.drive.settings.recipes import split_sets
 from tui.drive.settings.set_file import read_set
+from tui.session.drive import DriveSession
 
 from .commands import ended, refused, run, tcp_line
 from .printed import forms_of
@@ -169,6 +173,30 @@ def test_recipes_are_made_from_the_drives_of_a_line(tmp_path: Path) -> None:
     assert drive["ACC"] == 55
     assert {"ACC", "nCr", "Add"} <= drive.keys()
     assert not machine.keys() & drive.keys()
+
+
+def test_document_of_a_recipe_is_about_each_drive(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    values = {1: {"HSP": 500, "ACC": 30}, 2: {"HSP": 500, "ACC": 40, "nCr": 41}}
+    absent = {1: {"SP9": "refused"}, 2: {}}
+
+    def drives_read(target: Target) -> list[tuple[DriveSession, ParameterSet]]:
+        sessions = [DriveSession(FakeLine(), device, profile) for device in (1, 2)]
+        sets = [ParameterSet(SetHead("atv312", device=n), values[n], absent[n]) for n in (1, 2)]
+        return list(zip(sessions, sets, strict=True))
+
+    profile = library.load("atv312")
+    monkeypatch.setattr(backup, "_drives_read", drives_read)
+    words = ("backup", "sim:atv312", tmp_path / "x.toml", "--recipe", "-d", "1", "-d", "2")
+    done = ended(4, *words, "--json")
+    assert [
+        (each["device"], each["file"], each["parameters"], each["absent"], each["all"])
+        for each in json.loads(done.stdout)
+    ] == [
+        (1, str(tmp_path / "x-1.toml"), 1, {"SP9": "refused"}, False),
+        (2, str(tmp_path / "x-2.toml"), 2, {}, False),
+    ]
 
 
 def test_values_on_different_scales_are_not_shared() -> None:

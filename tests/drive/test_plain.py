@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.drive.plain import commands, markdown_table, plain
+from tui.drive.plain import commands, escaped_toml, markdown_table, plain
 
 
 @pytest.mark.parametrize(
@@ -36,6 +36,10 @@ def test_replacement_keeps_the_length_and_leaves_no_control_character(text: str)
     assert not any(commands(character) for character in shown)
     assert plain(shown) == shown
     shown.encode("utf-8")
+
+
+def test_text_that_no_file_can_hold_is_written_with_a_question_mark() -> None:
+    assert escaped_toml('a"\x1b\udcff') == '"a\\"\\u001b?"'
 
 
 def test_cell_of_markdown_ends_neither_its_column_nor_its_row() -> None:

@@ -269,6 +269,17 @@ def test_standstill_is_reported_if_the_test_ends_early(monkeypatch: pytest.Monke
     assert rig.progress == ["Device 4: stopped."]
 
 
+def test_begin_of_a_stop_is_marked_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    rig = Rig(monkeypatch)
+    rig.bench.report("order", "Device 4: forward.")
+    assert (rig.bench.stopped_at, rig.bench.curve.marks) == (0.0, [])
+    rig.bench.report("stopping", "Device 4: stopping.")
+    rig.console.session.clock = SimpleNamespace(monotonic=lambda: 11.0)
+    rig.bench.report("stopping", "Device 4: stopping.")
+    assert (rig.bench.stopped_at, rig.bench.curve.marks) == (10.0, [(10.0, "stop")])
+    assert rig.progress == []
+
+
 def test_failed_cycles_while_polling_is_paused_end_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

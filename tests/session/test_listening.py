@@ -142,6 +142,17 @@ def test_stored_line_names_its_drives(tmp_path: object) -> None:
     assert remembered_families(SerialLink("/dev/ttyS8")) == {}
 
 
+def test_identity_without_a_reference_replaces_none() -> None:
+    families = Families(PROFILES)
+    for text, kept in (("", ""), ("ATV71", "ATV71"), ("", "ATV71"), ("ATV31", "ATV31")):
+        objects = b"".join(
+            bytes([n, len(part)]) + part for n, part in ((0, b"S"), (1, text.encode()))
+        )
+        reply = bytes.fromhex("2b0e01010000") + b"\2" + objects
+        Heard(families).say(IDENTIFY, frame(2, reply))
+        assert families.identities[2].reference == kept
+
+
 def reads_of(profile_id: str, codes: Iterable[str]) -> list[bytes]:
     """Single reads of parameters with their replies."""
     profile = library.load(profile_id)

@@ -28,6 +28,7 @@ from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.journal import Journal
+from tui.session.monitor.alarms import PresentFault
 from tui.widgets.palette import ALARM
 
 from . import fakes
@@ -194,6 +195,15 @@ def test_console_stays_until_another_drive_replaces_it() -> None:
     assert fleet.consoles == [console]
     fleet.note(replace(fakes.ATV71, reference="ATV99"))  # another drive is there now
     assert fleet.consoles == []
+
+
+def test_fault_of_a_drive_that_was_replaced_is_not_recorded() -> None:
+    fleet, console = taken()
+    fault = PresentFault(2, "OCF", "Overcurrent", 1.0)
+    fleet._record_fault(fault, "tripped")
+    assert [entry.code for entry in fleet.journal._recent] == ["OCF"]
+    fleet._record_fault(replace(fault, device=console.device + 1), "tripped")
+    assert len(fleet.journal._recent) == 1
 
 
 def test_drive_commanded_by_the_panel_keeps_its_family() -> None:
