@@ -20,6 +20,10 @@ import msgspec
 
 from tui.drive.errors import DriveError
 
+AFTER_A_CHANGE = (
+    "If the change is intended, run python -m tests.recorded, and read the differences."
+)
+
 
 def sections(path: Path) -> dict[str, str]:
     """The text of each section of a file; a line `== NAME` begins one."""
@@ -65,6 +69,7 @@ def short(found: object) -> str:
 RECORDED = (
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
     "session.test_recorded_texts", "ui.test_recorded_drawings", "cli.test_recorded_refusals",
+    "cli.test_recorded_outputs", "test_tables",
 )  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 

@@ -33,7 +33,11 @@ DRIVE = ("sim:atv71@2", "-d", "2")
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a set of an Altivar 71, and one of its blocks."""
-    folder = tmp_path_factory.mktemp("sets")
+    return make_files(tmp_path_factory.mktemp("sets"))
+
+
+def make_files(folder: Path) -> Path:
+    """Write the files that the commands read."""
     ended(0, "backup", *DRIVE, folder / "set.toml")
     ended(0, "block", DRIVE[0], "save", folder / "slots.toml", *DRIVE[1:])
     text = (folder / "set.toml").read_text("utf-8")
