@@ -30,8 +30,8 @@ from tests.swapped import NotSwapped, functions_by_file, swap
 
 PIPES = "DRIVEPANEL_FORKED_PIPES"
 """The environment variable with two file descriptors: of requests, and of results."""
-MORE = ("tests/line/test_keeper.py", "tests/line/test_hung_keepers.py")
-"""Tests of other layers that random defects are given to."""
+MOST_ALIKE = 8
+"""Tests of one function with different parameters, if the function is requested as a whole."""
 PYTEST = (
     "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-p", "tests.forked",
     "--capture=sys", "--timeout", "60", "-m", "",
@@ -130,8 +130,7 @@ class Forker:
 
     def _run_tests(self, names: Sequence[str], writer: IO[str]) -> int:
         """Run tests until the first one fails; return how many ran."""
-        found = (self._of(name) if name.endswith(".py") else [name] for name in names)
-        items = [self._items[name] for name in chain(*found) if name in self._items]
+        items = [self._items[name] for name in chain(*map(self._of, names))]
         for count, (item, following) in enumerate(zip_longest(items, items[1:]), 1):
             writer.write(item.nodeid.replace("\n", " ") + "\n")
             writer.flush()
@@ -140,8 +139,14 @@ class Forker:
                 return count
         return len(items)
 
-    def _of(self, file: str) -> list[str]:
-        return [name for name in self._items if name.startswith(f"{file}::")]
+    def _of(self, chosen: str) -> list[str]:
+        """The tests of a name: one, those of a file, or some of a function with parameters."""
+        if chosen in self._items:
+            return [chosen]
+        if chosen.endswith(".py"):
+            return [name for name in self._items if name.startswith(f"{chosen}::")]
+        found = [name for name in self._items if name.startswith(f"{chosen}[")]
+        return found[:: len(found) // MOST_ALIKE + 1]
 
     def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
         """Remember the first failure, of a fixture too."""
@@ -168,9 +173,8 @@ def pytest_runtestloop(session: pytest.Session) -> bool:
 
 
 def _collected(copy: Path) -> list[str]:
-    """Files of tests, those of the main layer and some more."""
-    main = (path.relative_to(copy).as_posix() for path in (copy / "tests").rglob("test_*.py"))
-    return sorted(path for path in main if not path.startswith("tests/line/") or path in MORE)
+    """Files of tests, of all layers."""
+    return sorted(path.relative_to(copy).as_posix() for path in (copy / "tests").rglob("test_*.py"))
 
 
 class Forks:

@@ -40,6 +40,12 @@ MOST_ALIKE = 3
 """Tests of one function with other parameters that are run for one defect, if there are others."""
 MOST_SECONDS = 40.0, 40.0
 """Time of these tests, as recorded."""
+TABLES = "tests/test_tables.py::test_constants_and_tables_are_the_recorded_ones"
+"""The test of what a package fixes at import."""
+MOST_BY_NAME = 24
+"""Test functions that are run because they share names with the line, whatever is recorded."""
+MOST_ON_TERMINALS = 3
+"""Of these, tests of `line/`: they take seconds each, and reach code in processes of its own."""
 FOLDERS = {"screens": "ui", "keeper": "session"}
 """By package: the folder of its tests, if it has another name."""
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-random-defects.json"
@@ -55,6 +61,7 @@ NOT_RECORDED = {
         "tests/drive/test_whole_profile.py",
         "tests/drive/test_library.py::test_committed_schema_is_up_to_date",
     ),
+    "tui/cli/*": ("tests/cli/test_recorded_outputs.py",),
     "tui/cli/derived.py": ("tests/cli/test_derived.py",),
     "tui/screens/*/registration.py": ("tests/ui/test_key_pages.py", "tests/ui/test_palette.py"),
     "tui/screens/blocks/registration.py": ("tests/ui/test_block_pictures.py",),
@@ -65,8 +72,11 @@ NOT_RECORDED = {
     "tui/screens/keys/*": ("tests/ui/test_key_pages.py",),
 }
 """By the pattern of a path: tests of code that runs in processes of its own, or at import only."""
-BY_SOURCE = re.compile(r"\bwith self\._|Thread\(|\.spawn\(")
-"""Lines on locks, threads and workers, which tests check in the source."""
+BY_SOURCE = {
+    r"\bwith self\._|Thread\(|\.spawn\(": "tests/test_locks.py",
+    r"\blog\.\w+\(": "tests/test_texts.py::test_each_log_text_fits_its_values",
+}
+"""By lines on locks, threads, workers and the log: tests that check them in the source."""
 _FAILED = re.compile(r"^(?:FAILED|ERROR) (tests/.*)$", re.MULTILINE)
 UNREACHED, EQUAL = "NOT REACHED", "EQUIVALENT"
 
@@ -193,6 +203,7 @@ class Chooser:
         self._usable = {
             name for name, reach in record.tests.items() if reach.passed and _exists(name)
         }
+        self._recorded = {name.partition("[")[0] for name in record.tests}
 
     def tests(self, mutant: Mutant) -> list[list[str]]:
         """The tests to run, those most about the changed line first, and those to run then."""
@@ -200,9 +211,37 @@ class Chooser:
         for pattern, others in NOT_RECORDED.items():
             if fnmatch(mutant.path, pattern):
                 first += others
-        if BY_SOURCE.search(_text(mutant.path).splitlines()[mutant.line - 1]):
-            first.append("tests/test_locks.py")
-        return [part for part in (first, then) if part]
+        line = _text(mutant.path).splitlines()[mutant.line - 1]
+        first += (test for pattern, test in BY_SOURCE.items() if re.search(pattern, line))
+        tables = [] if mutant.lines else [f"{TABLES}[{mutant.path.split('/')[1]}]"]
+        return [part for part in (tables, first, then, self._by_name(mutant)) if part]
+
+    def is_reached(self, mutant: Mutant) -> bool:
+        """True if a recorded test reaches the changed line."""
+        return bool(self._reaching(mutant) & self._usable)
+
+    def _by_name(self, mutant: Mutant) -> list[str]:
+        """Test functions that name the module or share names with the line.
+
+        Those that were not recorded; if no recorded test reaches the line, any. The record may be
+        older than the code, and does not follow processes that a test starts.
+        """
+        left = self._recorded if self.is_reached(mutant) else set()
+        line = _text(mutant.path).splitlines()[mutant.line - 1]
+        words = _pieces(" ".join((line, mutant.function, *mutant.names, Path(mutant.path).stem)))
+        module = mutant.path.removesuffix(".py").replace("/", ".")
+        ranked = []
+        for file in _test_files():
+            near = 0.2 * (module in _text(file)) + 0.1 * _shared_words(mutant.path, file)
+            for name, names in _pieces_by_function(file).items():
+                if name.startswith("test_") and f"{file}::{name}" not in left:
+                    # names that few tests have say most
+                    score = near + sum(1 / _tests_with()[word] for word in words & names)
+                    ranked.append((-score, f"{file}::{name}"))
+        best = [name for score, name in sorted(ranked) if score < -0.01]
+        main = [name for name in best if not name.startswith("tests/line/")]
+        others = [] if left else [name for name in best if name.startswith("tests/line/")]
+        return main[:MOST_BY_NAME] + others[:MOST_ON_TERMINALS]
 
     def runs_at_import(self, mutant: Mutant) -> bool:
         """True if a fork, which begins after all imports, would not run it again."""
@@ -301,6 +340,19 @@ def _names_in(text: str) -> set[str]:
     return set(re.findall(r"[A-Za-z_]{4,}", text))
 
 
+def _pieces(text: str) -> set[str]:
+    """Names in a text, and the words of which they consist."""
+    return _names_in(text) | set(re.findall("[a-z]{4,}", text))
+
+
+@cache
+def _pieces_by_function(file: str) -> dict[str, set[str]]:
+    """By each function of a test file: the names and words in its own name and its source."""
+    pieces = re.split(r"^(?:async )?def (\w+)", _text(file), flags=re.MULTILINE)
+    both = zip(pieces[1::2], pieces[2::2], strict=True)
+    return {name: _pieces(f"{name} {body}") for name, body in both}
+
+
 @cache
 def _names_by_function(file: str) -> dict[str, set[str]]:
     """By each test function of a file: the names in its source."""
@@ -311,6 +363,26 @@ def _names_by_function(file: str) -> dict[str, set[str]]:
 def _names_of(test: str) -> set[str]:
     file, _, function = test.partition("[")[0].partition("::")
     return _names_by_function(file).get(function, set())
+
+
+def _shared_words(path: str, file: str) -> int:
+    """Count words of a path that begin a word of a test file's name, or begin with it."""
+    words, others = (re.findall("[a-z]{4,}", name) for name in (path, Path(file).stem))
+    pairs = ((word, other) for word in set(words) for other in set(others))
+    return sum(word.startswith(other) or other.startswith(word) for word, other in pairs)
+
+
+@cache
+def _test_files() -> list[str]:
+    """Files of tests, of all layers."""
+    return sorted(path.relative_to(ROOT).as_posix() for path in (ROOT / "tests").rglob("test_*.py"))
+
+
+@cache
+def _tests_with() -> Counter[str]:
+    """By each name: the number of test functions that have it in their source."""
+    each = (names for file in _test_files() for names in _pieces_by_function(file).values())
+    return Counter(name for names in each for name in names)
 
 
 @cache
@@ -352,6 +424,8 @@ class Judge:
             by = EQUAL
         else:
             by = self._noticed_by(mutant, tests, copy, runs_at_import) if tests else UNREACHED
+            if by == SURVIVED and not self._chooser.is_reached(mutant):
+                by = UNREACHED
         package = mutant.path.split("/")[1]
         seconds = time.monotonic() - begun
         count = sum(map(len, tests))
@@ -389,15 +463,20 @@ class Judge:
             while tests and (failed := run(tests, True)):
                 if run([failed], True) and self._passes_without(failed, run):
                     return failed
-                if failed not in tests:
-                    break  # one of a file that was chosen as a whole
-                tests = tests[tests.index(failed) + 1 :]
+                # it may be one of a file, or of a function with parameters, that was chosen
+                chosen = (n for n, name in enumerate(tests, 1) if _is_of(failed, name))
+                tests = tests[next(chosen, len(tests)) :]
         return ""
 
     def _passes_without(self, test: str, run: Callable[[list[str], bool], str]) -> bool:
         if test not in self._passes:
             self._passes[test] = not run([test], False)
         return self._passes[test]
+
+
+def _is_of(test: str, name: str) -> bool:
+    """True if a name stands for this test, alone or with others."""
+    return test == name or test.startswith((f"{name}::", f"{name}["))
 
 
 def _first_failure(tests: list[str], copy: Path) -> str:

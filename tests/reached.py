@@ -108,8 +108,8 @@ def pytest_configure(config: pytest.Config) -> None:
 def record(copy: Path, commit: str, tests: Sequence[str], jobs: int) -> Record:
     """Run tests in a copy of the checkout and keep the lines that each reaches.
 
-    Named tests are added to what is recorded for the commit. With none named, all are recorded
-    again, and the records of other commits are deleted.
+    Named tests are added to what is recorded for the commit, of a named file also the sweeps. With
+    none named, all are recorded again, and the records of other commits are deleted.
     """
     from coverage import CoverageData
 
@@ -117,6 +117,7 @@ def record(copy: Path, commit: str, tests: Sequence[str], jobs: int) -> Record:
     parts.mkdir(parents=True, exist_ok=True)
     environment = {**os.environ, "PYTHONPATH": str(copy), PARTS: str(parts)}
     command = [sys.executable, *PYTEST, "-n", str(jobs), "--dist", "worksteal", *tests]
+    command += ["-m", ""] if any(test.endswith(".py") for test in tests) else []
     subprocess.run(command, cwd=copy, env=environment, check=False)
     lines_file, tests_file = (folder() / f"{commit}.{name}" for name in ("lines", "json"))
     for file in () if tests else (*folder().glob("*.lines"), *folder().glob("*.json")):

@@ -413,6 +413,30 @@ def run(motor: int) -> None:
     assert by_kind["L"] == {"Show X."}
 
 
+LOG_CALLS = {"debug", "info", "warning", "error", "exception"}
+
+
+def wrong_log_calls(tree: ast.Module) -> Iterator[int]:
+    """Lines of calls to the log whose text is missing, or does not fit the number of values."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Call(func=ast.Attribute(ast.Name("log"), name), args=args) if (
+                name in LOG_CALLS
+            ):
+                match args:
+                    case [ast.Constant(value=str() as text), *values] if text:
+                        if len(re.findall("%[^%]", text)) == len(values):
+                            continue
+                yield node.lineno
+
+
+def test_each_log_text_fits_its_values() -> None:
+    wrong = {str(path): list(wrong_log_calls(tree_of(path))) for path in modules()}
+    assert {path: lines for path, lines in wrong.items() if lines} == {}
+    bad = 'log.info("")', 'log.info(name, "%s")', 'log.info("%s of %s", name)', "log.error(text)"
+    assert all(list(wrong_log_calls(ast.parse(source))) == [1] for source in bad)
+
+
 def test_prose_excludes_code(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(f"{__name__}.ROOT", tmp_path)
     page = tmp_path / "page.md"
