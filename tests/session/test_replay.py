@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import closing, contextmanager
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -24,16 +25,20 @@ from tui.bus.errors import (
 )
 from tui.bus.link import SerialLink
 from tui.drive.profile.library import load
+from tui.session import replay
 from tui.session.connect.identify import DriveIdentity
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.fleet import Fleet
+from tui.session.monitor.line_watch import LineWatch
+from tui.session.monitor.trend import Trend
 from tui.session.record.history import read_history
 from tui.session.record.record_file import RecordFile
 from tui.session.record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from tui.session.record.replay_text import open_replay, parse_replay, time_in
 from tui.session.record.schema import EventRow, ReplyRow
 from tui.session.replay import UnwrittenJournal, open_past, pass_lead, take_drives
+from tui.session.replay_past import RecordedCycles, recall_past
 from tui.session.shown import Quality
 from tui.simulator import DriveSpec
 
@@ -404,6 +409,21 @@ def test_curve_of_a_drive_opened_later_has_each_recorded_cycle(tmp_path: Path) -
         found = currents(console)
     assert [at for at in found if at < 399.5] == [*range(1, 400)]
     assert [at for at, value in found.items() if value == 20.0] == [PEAK]
+
+
+def test_checks_of_the_line_read_no_cycles_while_a_curve_is_made(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both read by the same object, in two threads."""
+    known: list[bool] = []
+
+    def recall(past: RecordedCycles, watch: LineWatch, *times: Any) -> Trend:
+        known.append(past.console.device in watch.recorded)
+        return recall_past(past, watch, *times)
+
+    monkeypatch.setattr(replay, "recall_past", recall)
+    with replayed_drive(cycles(tmp_path, range(1, 50)), 40, None):
+        assert known == [False]
 
 
 def test_curve_on_line_has_the_recorded_checks_and_no_others(tmp_path: Path) -> None:

@@ -237,10 +237,12 @@ async def pass_lead(
             since, monitored = line.at - PAST_SECONDS, begin
         events = [e.utc / 1e6 for e in line.events if e.device == console.device]
         await asyncio.to_thread(_take_known, line, console.session)  # scales of the curve
-        past = watch.recorded[console.device] = RecordedCycles(line, console)
+        past = RecordedCycles(line, console)
         curve = await asyncio.to_thread(recall_past, past, watch, events, since, monitored)
         await line.do(partial(_resume, console, curve), f"curve of {console.device}")
         console.recorder.since = await asyncio.to_thread(_first_read, line, console.session)
+        # for the line's loop only now: no thread reads by it any more
+        watch.recorded[console.device] = past
     if shown is not None:
         await line.run_to(begin, EXACT_TAKES)
         monitor(shown)
