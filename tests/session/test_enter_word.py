@@ -8,6 +8,7 @@ import pytest
 
 from tests.mixer import HERTZ, MIXER, installed_mixer, mixer_text
 from tests.session.sets_bench import bench
+from tui.bus.errors import NoAnswer
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.session.settings.applied import EditOutcome
@@ -112,6 +113,15 @@ async def test_refused_word_leaves_the_setting_unused_and_staged() -> None:
         assert "The next setting that is written enters it, too." in result.text
         assert made.drive.registers.in_force(made.profile["ACC"]) == 30
         assert any(entry.answer == "not in effect" for entry in made.journal.sent)
+
+
+async def test_setting_whose_word_may_be_lost_does_not_count_as_written() -> None:
+    installed()
+    with bench(MIXER) as made:
+        made.lose_answer("ENTER", NoAnswer(1, 6, ENTER), taken=False)
+        [result] = (await made.apply(ACC="5.0")).results
+        assert result.outcome is EditOutcome.NOT_TAKEN
+        assert "the drive does not use it yet" in result.text
 
 
 async def test_setting_is_saved_by_a_word_that_can_only_be_written() -> None:

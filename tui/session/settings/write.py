@@ -128,7 +128,7 @@ class Writer:
     async def _enter(self, parameter: Parameter) -> None:
         """Have the drive use a written setting, if its family needs a further word for that.
 
-        Raises NotTaken if that word is refused or not sent, and the line's errors.
+        Raises NotTaken if that word is refused, lost or not sent.
         """
         profile = self.session.profile
         enter = profile.data.memory.enter
@@ -142,7 +142,7 @@ class Writer:
             await self.write_parameter(
                 profile[enter.parameter], enter.raw, why=f"enter {parameter.code}", read_back=False
             )
-        except (RequestRefused, DeviceException, DriveError) as error:
+        except (LineError, DriveError) as error:
             raise NotTaken(
                 f"{parameter.code} was written, but the drive does not use it yet:"
                 f" {sentence(str(error))} The next setting that is written enters it, too."
