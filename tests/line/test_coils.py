@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
+import signal
 import subprocess
 from pathlib import Path
 
 import pytest
 
-from tests.programs import PATIENCE, drivepanel, port_of, pty_pair, served, simulated
+from tests.programs import (
+    DRIVEPANEL,
+    PATIENCE,
+    drivepanel,
+    end_keepers,
+    port_of,
+    pty_pair,
+    rtu_tcp,
+    served,
+    simulated,
+    wait_until,
+)
 from tui.drive.profile import library
+from tui.simulator import DriveSpec, Simulation
 
 from .conftest import HERE, Peer
 
@@ -75,3 +89,23 @@ def test_mbpoll_commands_a_simulated_drive(peer: Peer) -> None:
         assert "Illegal data address" in mbpoll(peer, port, "1", 0, count=4)
         assert "Written 4 references" in mbpoll(peer, port, "0", 1, "0", "0", "0", "0")
         assert raws(f"tcp:127.0.0.1:{port}", 1, "CTRL", "FAN") == {"CTRL": 0, "FAN": 1}
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGTERM])
+def test_motor_of_a_program_that_is_ended_is_stopped_by_its_coils(number: signal.Signals) -> None:
+    """If it is killed, the keeper of the line stops the motor."""
+    simulation = Simulation([DriveSpec("example-coils", 1)])
+    simulation.start()
+    drive, line = simulation.drive(1), rtu_tcp(simulation)
+    wish = ("-d", "1", "-p", "example-coils", "--arm", "--reference", "20Hz", "--for", "50")
+    command = [*DRIVEPANEL, "run", line, *wish]
+    try:
+        with subprocess.Popen(command, stdout=subprocess.DEVNULL) as program:
+            wait_until(lambda: drive.motor.frequency > 10, "the motor runs")
+            assert drive.raw("CTRL") == 1
+            os.kill(program.pid, number)
+            wait_until(lambda: not drive.motor.energised, "the motor is stopped")
+        assert drive.raw("CTRL") == 0
+    finally:
+        end_keepers()
+        simulation.stop()
