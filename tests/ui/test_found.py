@@ -32,6 +32,7 @@ from tui.session.monitor.alarms import PresentFault
 from tui.widgets.palette import ALARM
 
 from . import fakes
+from .test_flows import picture, until
 
 NAMELESS = DriveIdentity(7, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
 
@@ -177,6 +178,26 @@ async def test_new_state_moves_nothing_in_a_long_drive_list(
         screen.show_drives()
         assert [option.id for option in drives.options][:3] == ["1", "2", "3"]
         assert drives.chosen == 26
+
+
+async def test_drive_without_a_profile_opens_once_one_is_typed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app = fakes.app_of()
+    opened: list[DriveConsole] = []
+    monkeypatch.setattr(app, "show_monitor", opened.append)
+    async with app.run_test() as pilot:
+        app.opened, app.fleet = fakes.opened(), Fleet(fakes.StillLine(), Journal())
+        app.fleet.note(DriveIdentity(9, "", "", "", "", None, ()))
+        app.connection.open_drive(9)
+        field = app.connection.form._fields["profile"]
+        await until(pilot, lambda: app.focused is field)
+        await until(pilot, lambda: "Device 9 does not identify itself." in picture(app))
+        assert opened == []
+        await pilot.press(*"atv71")
+        app.connection.open_drive(9)
+        await until(pilot, lambda: bool(opened))
+        assert [(each.device, each.session.profile.id) for each in opened] == [(9, "atv71")]
 
 
 # A drive that was found stays stoppable

@@ -46,7 +46,9 @@ async def test_replacement_is_offered_and_nothing_is_written(
         await event(made, "old.toml: 4 can be staged", "Rating: the same model.")
         about = about_set(found[0], library.load("atv312"), {})
         assert (about.reported, about.alarm) == ("predecessor", False)
-        await event(made, "Predecessor: Altivar 31, ATV31HU09M3", "Firmware: another version")
+        await event(
+            made, "Predecessor: Altivar 31, ATV31HU09M3", "model. Firmware: another version"
+        )
         await event(made, "drivepanel accept")
         assert len(made.app.chosen.editor.staging.edits) == 0  # type: ignore[union-attr]
         await made.pilot.press("i")
