@@ -61,7 +61,10 @@ NOT_RECORDED = {
         "tests/drive/test_whole_profile.py",
         "tests/drive/test_library.py::test_committed_schema_is_up_to_date",
     ),
-    "tui/cli/*": ("tests/cli/test_recorded_outputs.py",),
+    "tui/cli/*": (
+        "tests/cli/test_recorded_refusals.py",
+        "tests/cli/test_recorded_outputs.py",
+    ),
     "tui/cli/derived.py": ("tests/cli/test_derived.py",),
     "tui/screens/*/registration.py": ("tests/ui/test_key_pages.py", "tests/ui/test_palette.py"),
     "tui/screens/blocks/registration.py": ("tests/ui/test_block_pictures.py",),
@@ -241,7 +244,7 @@ class Chooser:
         best = [name for score, name in sorted(ranked) if score < -0.01]
         main = [name for name in best if not name.startswith("tests/line/")]
         others = [] if left else [name for name in best if name.startswith("tests/line/")]
-        return main[:MOST_BY_NAME] + others[:MOST_ON_TERMINALS]
+        return _spread(main[: 4 * MOST_BY_NAME])[:MOST_BY_NAME] + others[:MOST_ON_TERMINALS]
 
     def runs_at_import(self, mutant: Mutant) -> bool:
         """True if a fork, which begins after all imports, would not run it again."""
