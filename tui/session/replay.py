@@ -239,6 +239,7 @@ async def pass_lead(
         await asyncio.to_thread(_take_known, line, console.session)  # scales of the curve
         past = RecordedCycles(line, console)
         curve = await asyncio.to_thread(recall_past, past, watch, events, since, monitored)
+        watch.recorded[console.device] = past  # from now on for the line's loop only
         await line.do(partial(_resume, console, curve), f"curve of {console.device}")
         console.recorder.since = await asyncio.to_thread(_first_read, line, console.session)
         # for the line's loop only now: no thread reads by it any more
