@@ -11,7 +11,7 @@ import random
 import re
 import time
 from collections.abc import Callable, Sequence
-from itertools import pairwise
+from itertools import pairwise, zip_longest
 from pathlib import Path
 from typing import NamedTuple
 
@@ -53,7 +53,7 @@ LEFT_OUT: dict[str, tuple[str, ...]] = {
         r"^ +(ULP0|THD|OTR) .*", r"(?<=^  [A-Z0-9]{3}) +[^ ].*?(?=  )", r"─+",
     ),
 }  # fmt: skip
-SAME_POINT, SAME_CHECK = 1.2, 3.2
+SAME_POINT, SAME_CHECK = 1.6, 3.2
 """Seconds between a point of a live curve and one of its replay with the same values: cycles. The
 first cycle after a change of screens has no pause before it. A check of a lost line is not
 recorded, so its mark may be a check earlier or later. What else was read between two checks may be
@@ -311,7 +311,7 @@ async def test_screens_of_a_replay_show_what_they_showed_live(
         for place, item in enumerate(order):
             now = await shown_at(made, item, goes_on=goes_on and place > 0)
             if now != item.rows:
-                pairs = zip(item.rows, now, strict=False)
+                pairs = zip_longest(item.rows, now, fillvalue="")
                 rows = "\n  ".join(f"{a}\n  > {b}" for a, b in pairs if a != b)
                 different.append(f"{item.place} at {item.wall % 1000:.1f}\n  {rows}")
     assert not different, "\n".join(different)
