@@ -242,8 +242,6 @@ async def pass_lead(
         watch.recorded[console.device] = past  # from now on for the line's loop only
         await line.do(partial(_resume, console, curve), f"curve of {console.device}")
         console.recorder.since = await asyncio.to_thread(_first_read, line, console.session)
-        # for the line's loop only now: no thread reads by it any more
-        watch.recorded[console.device] = past
     if shown is not None:
         await line.run_to(begin, EXACT_TAKES)
         monitor(shown)
