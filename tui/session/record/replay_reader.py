@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from tui.bus.errors import ChecksumFault, DeviceException, ExchangeError, NoAnswer, WrongReply
-from tui.bus.expectation import IDENTIFY
+from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.bus.model import IdentificationObjects
 from tui.bus.requests import REFERENCE, Objects, own_words_of
 
@@ -95,6 +95,8 @@ class _KnownRecord:
     """By device, times and the newest replies then; the next time reads on from there."""
     identified: dict[tuple[int, int], IdentificationObjects | None] = field(default_factory=dict)
     """By device and function."""
+    answers: dict[tuple[int, int], list[tuple[bytes, bytes]]] | None = None
+    """By device and function, requests for an identification with their replies."""
 
 
 @lru_cache(maxsize=1)
@@ -236,11 +238,16 @@ class ReplayReader(RecordReader):
         return known[device, function]
 
     def _identification(self, device: int, function: int) -> IdentificationObjects | None:
-        rows = self._base.execute(
-            f"SELECT sent, received FROM reply WHERE device = ? AND quality = {GOOD}"
-            " AND function = ? ORDER BY utc, id",
-            (device, function),
-        ).fetchall()
+        if self._known.answers is None:  # one search for all devices: it reads the whole record
+            found_in = self._base.execute(
+                f"SELECT device, function, sent, received FROM reply WHERE quality = {GOOD}"
+                " AND function IN (?, ?) ORDER BY utc, id",
+                (IDENTIFY, REPORT_ID),
+            )
+            self._known.answers = {}
+            for number, kind, *pair in found_in:
+                self._known.answers.setdefault((number, kind), []).append((pair[0], pair[1]))
+        rows = self._known.answers.get((device, function), [])
         if function != IDENTIFY:
             words = own_words_of(rows[-1][1]) if rows else b""
             return IdentificationObjects(0, {REFERENCE: words}) if rows else None
