@@ -20,11 +20,13 @@ from tests.programs import DRIVEPANEL, PATIENCE
 from tests.sources import ROOT
 from tests.sweeps import kept
 from tui.bus.errors import LineLost
+from tui.bus.fake import FakeLine
 from tui.cli.shared.say import Messages
-from tui.cli.shared.sets import say_afterwards
+from tui.cli.shared.sets import say_afterwards, take_set
 from tui.drive.profile import library
 from tui.drive.settings.restore_plan import RestorePlan
 from tui.drive.small_file import supplied
+from tui.session.drive import DriveSession
 from tui.session.settings.restore import plan_for
 
 from .commands import ended, held, invoked, motor, refused, run, tcp_line
@@ -495,3 +497,13 @@ def test_nothing_to_write_is_no_refusal_on_a_read_only_line(tmp_path: Path) -> N
 @pytest.mark.parametrize("typed", ["ACC=abc", "ACC=16#zz", "CHCF=Nowhere", "NOSUCH=3"])
 def test_bad_value_and_bad_code_have_one_status(typed: str) -> None:
     refused(2, "write", "sim:atv71", typed, "--arm")
+
+
+async def test_set_of_a_drive_that_was_not_identified_has_its_identity() -> None:
+    line = FakeLine({4: dict.fromkeys(range(65536), 0)})
+    line.devices[4].identity = {0: b"Schneider", 1: b"ATV71HU22N4"}
+    session = DriveSession(line, 4, library.load("atv71"))
+    values = await take_set(session, settings_only=True)
+    assert values.head.identity["reference"] == "ATV71HU22N4"
+    assert "ACC" in values.raws
+    assert "RFR" not in values.raws
