@@ -418,7 +418,7 @@ LOG_CALLS = {"debug", "info", "warning", "error", "exception"}
 
 def wrong_log_calls(tree: ast.Module) -> Iterator[int]:
     """Lines of calls to the log whose text is missing, or does not fit the number of values."""
-    for node in ast.walk(tree):
+    for node in walked(tree):
         match node:
             case ast.Call(func=ast.Attribute(ast.Name("log"), name), args=args) if (
                 name in LOG_CALLS
