@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ from tui.cli.main import main
 from tui.drive.profile import library
 
 PUMP = Path(__file__).parent / "pump.toml"
+ATV320 = Path(__file__).parents[1] / "line" / "profiles" / "atv320-kind.toml"
 RAMP = 'max = 6000\nfactory = 300\naccess = "rw"\nstorage = "{}"\n'
 SAVE = """[memory.save]
 parameter = "KEEP"
@@ -29,6 +31,7 @@ reactions = [
   {{ raw = 0, name = "Stop and trip", does = "Stops.", trips = {} }},
 ]
 """
+
 
 HINTS = {
     "a setting in RAM": (
@@ -86,6 +89,46 @@ def test_missing_order_of_two_words_gets_a_hint(tmp_path: Path) -> None:
         "utf-8",
     )
     assert len(library.hints_of(path)) == 1
+
+
+@pytest.mark.parametrize(("added", "first"), [(40001, 40001), (30001, 30001), (400, None)])
+def test_numbers_of_the_manual_as_addresses_get_one_hint(
+    tmp_path: Path, added: int, first: int | None
+) -> None:
+    text = re.sub(
+        r"^address = (\d+)",
+        lambda found: f"address = {added + int(found[1])}",
+        PUMP.read_text("utf-8"),
+        flags=re.M,
+    )
+    path = tmp_path / "own.toml"
+    path.write_text(text, "utf-8")
+    hints = [hint for hint in library.hints_of(path) if "manual's numbers" in hint]
+    assert len(hints) == (first is not None)
+    if first is not None:
+        assert f"addresses from {first} up are the manual's numbers" in hints[0]
+        assert f"the wire address is the number - {first}, here 100." in hints[0]
+        assert ("They need function = 4" in hints[0]) == (first == 30001)
+
+
+def test_sign_without_a_reverse_command_gets_a_hint(tmp_path: Path) -> None:
+    text = ATV320.read_text("utf-8")
+    unsigned, path = re.sub('.*id = "reverse".*\n', "", text), tmp_path / "own.toml"
+    signed = unsigned.replace('feedback = "RFR"', 'feedback = "RFR"\nsigned = true')
+    assert text != unsigned != signed
+    for source, reported in ((text, 0), (unsigned, 0), (signed, 1)):
+        path.write_text(source, "utf-8")
+        assert library.all_faults_of(path) == []
+        found = [hint for hint in library.hints_of(path) if "it has a sign" in hint]
+        assert len(found) == reported
+    line = signed[: signed.index("[[references]]")].count("\n") + 1
+    assert found[0].startswith(f"{path}:{line}: reference LFR: ")
+    assert found[0].endswith('reverse with the words of forward, and reverse = "negative" here.')
+
+
+def test_few_high_addresses_get_no_hint(tmp_path: Path) -> None:
+    path, _ = written(tmp_path, [(FREQ, FREQ.replace("address = 101", "address = 40101"))])
+    assert not any("manual's numbers" in hint for hint in library.hints_of(path))
 
 
 def test_profiles_without_a_doubt_get_no_hint(tmp_path: Path) -> None:

@@ -77,7 +77,8 @@ MISTAKES: dict[str, tuple[str, ...]] = {
         "ms",
         "[0x0022]",
         "[0x0012]",
-        "also those of forward",
+        "also those of forward. If the sign of the reference gives the direction, write"
+        ' reverse = "negative" in [[references]].',
         'id = "reverse"',
     ),
     "a run command to all drives": (
@@ -442,6 +443,74 @@ def test_unbroken_files_are_valid() -> None:
     assert {name: library.faults_of(path) for name, path in FILES.items()} == {
         name: [] for name in FILES
     }
+
+
+FRAME = """[[frames]]
+sent = "01 03 00 64 00 02 85 D4"
+answered = "01 03 04 00 02 00 C8 5A 65"
+means = ["{}"]
+source = "guide"
+
+[faults]"""
+CHECKED: dict[str, tuple[str, str, str]] = {
+    "a kind that no simulated drive has": (
+        'id = "pump"\n',
+        'id = "pump"\nkind = "foo"\n',
+        "there is no kind 'foo'. Allowed: plain, altivar21, drivecom, io, leroy-somer.",
+    ),
+    "a frame of no parameter": (
+        "[faults]",
+        FRAME.format("FREK = 20.0 Hz"),
+        "frame: there is no parameter 'FREK'. Did you mean FREQ?",
+    ),
+    "a frame without a value": (
+        "[faults]",
+        FRAME.format("20 Hz"),
+        "frame: '20 Hz' is not written as CODE = value, such as FREQ = 50.0 Hz.",
+    ),
+    "a frame in another unit": (
+        "[faults]",
+        FRAME.format("FREQ = 20.0 rpm"),
+        "frame: 'FREQ = 20.0 rpm': FREQ is a number in Hz, such as 50.0 Hz.",
+    ),
+    "a frame without its unit": (
+        "[faults]",
+        FRAME.format("FREQ = 20.0"),
+        "'FREQ = 20.0': FREQ is a number in Hz, such as 50.0 Hz.",
+    ),
+    "a frame with a unit too many": (
+        "[faults]",
+        FRAME.format("STAT = 2 Hz"),
+        "frame: 'STAT = 2 Hz': STAT has no unit.",
+    ),
+    "a frame of other registers": (
+        "[faults]",
+        FRAME.format("RAMP = 2.00 s"),
+        "frame: RAMP is not in its registers: 100 to 101.",
+    ),
+}
+"""Mistakes that `--check` refuses, and with which a profile can still be used."""
+
+
+@pytest.mark.parametrize("name", CHECKED)
+def test_mistake_is_refused_by_the_check_alone(tmp_path: Path, name: str) -> None:
+    right, wrong, reported = CHECKED[name]
+    text = PUMP.read_text("utf-8")
+    assert text.count(right) == 1
+    path = tmp_path / "own.toml"
+    path.write_text(text.replace(right, wrong), "utf-8")
+    found = [fault for fault in library.all_faults_of(path) if reported in fault]
+    place = text.index(right) if "frame" in name else text.index(right) + len(right)
+    line = text[:place].count("\n") + 1 + 3 * ("frame" in name)
+    assert [item[: len(f"{path}:{line}: ")] for item in found] == [f"{path}:{line}: "]
+    assert library.faults_of(path) == []
+
+
+def test_frame_with_its_values_is_right(tmp_path: Path) -> None:
+    path = tmp_path / "own.toml"
+    means = FRAME.format('FREQ = 20.0 Hz", "STAT = 16#0002')
+    path.write_text(PUMP.read_text("utf-8").replace("[faults]", means), "utf-8")
+    assert library.all_faults_of(path) == []
 
 
 @pytest.mark.parametrize("name", MISTAKES)

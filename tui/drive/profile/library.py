@@ -18,7 +18,8 @@ from .heads import RequestPrefixes, file_head, quick_head, request_prefixes
 
 if TYPE_CHECKING:
     from .profile import Profile
-    from .schema import HelpData
+    from .schema import HelpData, ProfileData
+    from .toml_lines import TomlPath
 
 
 class Listing(NamedTuple):
@@ -205,7 +206,7 @@ def all_faults_of(path: Path) -> list[str]:
     from .search_file import read_vocabulary
 
     try:
-        data, faults = examined(path, packaged_folder(), CHECKED_RULES)
+        data, faults = examined(path, packaged_folder(), (*CHECKED_RULES, _kinds_of_charts))
     except ProfileError as error:
         return [str(error)]
     reported = [str(fault) for fault in faults]
@@ -218,6 +219,22 @@ def all_faults_of(path: Path) -> list[str]:
         except ProfileError as error:
             reported += str(error).splitlines()
     return reported
+
+
+def _kinds_of_charts(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield charts of a kind that is neither plain nor that of a packaged profile."""
+    other = [(index, chart) for index, chart in enumerate(data.charts) if chart.kind != "plain"]
+    if not other:
+        return
+    packaged = [load_file(path).data for path in sorted(packaged_folder().glob("*.toml"))]
+    known = {chart.kind for profile in packaged for chart in profile.charts}
+    for index, chart in other:
+        if chart.kind not in known:
+            yield (
+                ("charts", index, "kind"),
+                f"chart {chart.id}: there is no kind {chart.kind!r}. Allowed: plain,"
+                f" {', '.join(sorted(known - {'plain'}))}. Omit it for a drive of your own.",
+            )
 
 
 def hints_of(path: Path) -> list[str]:

@@ -37,7 +37,7 @@ RULES: Rules = (
     *identification.IDENTIFICATION_RULES,
 )
 
-CHECKED_RULES = (*RULES, consistency.factory_choices)
+CHECKED_RULES = (*RULES, consistency.factory_choices, meanings.meanings_of_frames)
 """Rules of `profiles --check`: a profile that breaks only the further ones can still be used."""
 
 __all__ = ["CHECKED_RULES", "RULES", "Finding", "Rules"]

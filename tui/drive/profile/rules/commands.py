@@ -116,7 +116,10 @@ def _run_faults(chart: Chart, order: Order, runs: list[Order]) -> Iterator[str]:
     for other in runs[: runs.index(order)] if order in runs else ():
         same = other.id != order.id and other.when == order.when and order.words == other.words
         if same and (order.parameter or chart.command) == (other.parameter or chart.command):
-            yield f"order {order.id}: its words are also those of {other.id}."
+            yield (
+                f"order {order.id}: its words are also those of {other.id}. If the sign of the"
+                ' reference gives the direction, write reverse = "negative" in [[references]].'
+            )
 
 
 def _same(chart: Chart, order: Order, word: int, run: Order) -> bool:

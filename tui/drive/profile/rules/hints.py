@@ -22,6 +22,11 @@ WRITABLE = ("rw", "rw-stopped")
 SETTINGS_LISTED = 5
 LEAST_PATTERN = 6
 """Fewest rows with a number that show a pattern of addresses."""
+MANUAL_NUMBERS = ((3, 40001, ""), (4, 30001, ""), (3, 30001, " They need function = 4."),
+                  (2, 10001, ""))  # fmt: skip
+"""Function, first number of its registers in manuals, and what the rows need besides."""
+NUMBERS_OF_KIND = 9999
+"""Numbers from the first one on."""
 
 
 def commands_by_storage(data: ProfileData, _: Tables) -> Hints:
@@ -120,6 +125,35 @@ def odd_address(data: ProfileData, _: Tables) -> Hints:
                 )
 
 
+def manual_numbers(data: ProfileData, _: Tables) -> Hints:
+    """Yield the first of the addresses that look like numbers of the manual: 40001 for 0."""
+    for function, first, needs in MANUAL_NUMBERS:
+        rows = [row for row in enumerate(data.parameters) if row[1].function == function]
+        found = [row for row in rows if 0 <= row[1].address - first < NUMBERS_OF_KIND]
+        if 2 * len(found) > len(rows):
+            index, parameter = found[0]
+            yield (
+                ("parameters", index, "address"),
+                f"parameter {parameter.code}: addresses from {first} up are the manual's numbers:"
+                f" the wire address is the number - {first}, here {parameter.address - first}."
+                f"{needs}",
+            )
+
+
+def reverse_by_sign(data: ProfileData, _: Tables) -> Hints:
+    """Yield references with a sign if no command runs the motor in reverse."""
+    ids = {order.id for chart in data.charts for order in chart.orders}
+    for index, way in enumerate(data.references):
+        by_sign = way.signed or way.reverse == "negative"
+        if by_sign and "forward" in ids and "reverse" not in ids:
+            yield (
+                ("references", index),
+                f"reference {way.parameter}: it has a sign, but no order runs in reverse. If a"
+                " negative reference does, add an order reverse with the words of forward, and"
+                ' reverse = "negative" here.',
+            )
+
+
 def _number(parameter: Parameter) -> int | None:
     """Return the number of the manual as a whole number; None if it is not one."""
     text = parameter.number.strip()
@@ -136,4 +170,6 @@ HINT_RULES: tuple[Callable[[ProfileData, Tables], Hints], ...] = (
     order_of_words,
     reactions_that_trip,
     odd_address,
+    manual_numbers,
+    reverse_by_sign,
 )

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import re
 from collections.abc import Iterator
 
+from tui.drive.sentences import any_of
 from tui.drive.values import raw_range, word_count
 
 from ..profile_frame import FrameError, frame_contents
@@ -317,6 +319,48 @@ def profile_frames(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             yield at, f"frame: {error}"
         if not frame.means:
             yield at, "frame: `means` is empty. Name each value, such as 2103H = 50.00 Hz."
+
+
+def meanings_of_frames(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Yield meanings of example frames that no value of the frame can have."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    for index, frame in enumerate(data.frames):
+        try:
+            contents = frame_contents(frame)
+        except FrameError:
+            continue  # reported by profile_frames
+        last = contents.address + len(contents.words) - 1
+        for place, text in enumerate(frame.means):
+            at: TomlPath = ("frames", index, "means", place)
+            code, _, value = text.partition(" = ")
+            parameter = parameters.get(code)
+            if not value.strip():
+                yield at, f"frame: {text!r} is not written as CODE = value, such as FREQ = 50.0 Hz."
+            elif parameter is None:
+                near = difflib.get_close_matches(code.upper(), parameters, n=3, cutoff=0.6)
+                text = f"frame: there is no parameter {code!r}."
+                yield at, f"{text} Did you mean {any_of(near)}?" if near else text
+            elif (
+                parameter.function != contents.space
+                or not contents.address <= parameter.address <= last
+            ):
+                yield at, f"frame: {code} is not in its registers: {contents.address} to {last}."
+            elif fault := _unit_fault(parameter, value):
+                yield at, f"frame: {text!r}: {fault}"
+
+
+def _unit_fault(parameter: Parameter, value: str) -> str:
+    """Return why a number has a wrong unit; empty for texts, words, and units by a setting."""
+    number = re.fullmatch(r"-?[0-9]+(?:\.[0-9]+)?(.*)", value)
+    named = parameter.values or parameter.enumeration or parameter.unit_by
+    if named or parameter.type == "ascii" or value.startswith("16#"):
+        return ""
+    if parameter.unit:
+        right = number is not None and number[1] in (f" {parameter.unit}", " raw")
+        unit = parameter.unit
+        return "" if right else f"{parameter.code} is a number in {unit}, such as 50.0 {unit}."
+    wrong = number is not None and number[1] not in ("", " raw")
+    return f"{parameter.code} has no unit." if wrong else ""
 
 
 MEANING_RULES = (
