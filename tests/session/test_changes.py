@@ -134,6 +134,27 @@ def test_reference_that_changes_has_its_extent_until_the_stop(folder: Path) -> N
     assert (run.least, run.most) == ("25.0 Hz", "40.0 Hz")
 
 
+@pytest.mark.parametrize(
+    ("word", "numbers", "texts"),
+    [
+        (REVERSE, (-250, -250), ("25.0 Hz", "", "")),
+        (REVERSE, (-250, -400), ("25.0 Hz", "25.0 Hz", "40.0 Hz")),
+        (REVERSE, (-250, 0), ("25.0 Hz", "0.0 Hz", "25.0 Hz")),
+        (REVERSE, (-250, 100), ("-25.0 Hz", "-25.0 Hz", "10.0 Hz")),  # it turned the other way too
+        (FORWARD, (-250, -250), ("-25.0 Hz", "", "")),
+    ],
+)
+def test_sign_of_a_reference_is_shown_as_the_direction_of_the_run(
+    word: int, numbers: tuple[int, int], texts: tuple[str, str, str], folder: Path
+) -> None:
+    rows = [status(0, READY), *each_second(1, 20, word), status(20, READY)]
+    rows += [row(2.5 + at, REFERENCE, raw & 0xFFFF) for at, raw in enumerate(numbers)]
+    write(folder, rows)
+    run = the_run(folder)
+    assert (run.reference, run.least, run.most) == texts
+    assert f"RUN {run.direction} at {texts[0]} " in run_text(run)
+
+
 def test_direction_of_a_run_is_that_of_the_motor_once_it_turns(folder: Path) -> None:
     starts = [status(0, READY), *each_second(1, 3, FORWARD)]
     write(folder, [*starts, *each_second(3, 9, REVERSE), status(9, READY)])

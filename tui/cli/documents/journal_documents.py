@@ -68,7 +68,13 @@ class RunField(DocumentPart):
         float, Meta(description="Seconds by which the times may differ: from reading to reading.")
     ]
     direction: Literal["forward", "reverse"] | None
-    reference: Annotated[str | None, Meta(description="At the begin; null if it was not read.")]
+    reference: Annotated[
+        str | None,
+        Meta(
+            description="At the begin; null if it was not read. A reverse run has it without a"
+            " sign, unless the sign changed."
+        ),
+    ]
     least: str | None
     most: Annotated[
         str | None, Meta(description="Extent of the reference; null if it did not change.")

@@ -61,7 +61,10 @@ class RecordedRun(NamedTuple):
     """Seconds by which `ended` may be wrong. None: it ran when last read."""
     direction: str = ""
     reference: str = ""
-    """The reference at the begin, with its unit; empty if it was not read."""
+    """The reference at the begin, with its unit; empty if it was not read.
+
+    It has no sign if the direction is reverse, unless the sign changed during the run.
+    """
     least: str = ""
     most: str = ""
     """Extent of the reference during the run; empty if it did not change."""
@@ -312,18 +315,20 @@ def _described(
     times = bisect_left(points, span.begun, key=_time), bisect_left(points, until, key=_time)
     values = [point for point in points[slice(*times)] if point.least is not None]
     steady = [point for point in values if point.least == point.most]
-    at_begin, least, most = (
-        _text(references, value)
-        for value in (
-            steady[0].least if steady else None,
-            min((point.least for point in values if point.least is not None), default=None),
-            max((point.most for point in values if point.most is not None), default=None),
-        )
-    )
+    seen = [
+        steady[0].least if steady else None,
+        min((point.least for point in values if point.least is not None), default=None),
+        max((point.most for point in values if point.most is not None), default=None),
+    ]
+    direction = _direction(chart, span.words)
+    if direction == "reverse" and seen[2] is not None and seen[2] <= 0:
+        # such a drive has the direction as the sign of its reference
+        seen = [None if each is None else abs(each) for each in (seen[0], seen[2], seen[1])]
+    at_begin, least, most = (_text(references, value) for value in seen)
     least, most = (least, most) if least != most else ("", "")
     return RecordedRun(
         device, profile.id, span.begun, span.ended, span.begin_within, span.end_within,
-        _direction(chart, span.words), at_begin, least, most, who,
+        direction, at_begin, least, most, who,
     )  # fmt: skip
 
 
