@@ -20,6 +20,7 @@ from tui.screens.keys.table import EVERYWHERE, keys_line, screen_actions
 from tui.screens.monitor.arrange import OUTSIDE, WIDE, Arrangement, arrange
 from tui.screens.monitor.assembly import (
     codes_beside,
+    line_figures,
     monitor_parts,
     motor_lines,
     other_values,
@@ -69,6 +70,18 @@ def any_raws(draw: st.DrawFn, profile: Profile) -> dict[str, int]:
         for code in sorted(codes)
         if draw(st.integers(0, 9))
     }
+
+
+def test_replay_has_the_rate_of_its_record_and_no_alarm() -> None:
+    """The panel requests 2 cycles a second of a drive, whatever the record has."""
+    live = view_of(ATV71, fakes.RUNNING)
+    assert live.snapshot is not None
+    live = replace(live, snapshot=replace(live.snapshot, rate=1.0))
+    shown = [line_figures(view) for view in (live, replace(live, replayed=True))]
+    assert [text.plain.split(" by ")[0].strip() for text in shown] == [
+        "1.0 of 2.0 cycles/s", "1.0 cycles/s",
+    ]  # fmt: skip
+    assert [bool(text.spans) for text in shown] == [True, False]
 
 
 SIZES = st.sampled_from([(60, 16), (60, 20), (80, 24), (100, 30), (120, 40), (200, 60)])

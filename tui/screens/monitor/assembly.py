@@ -196,12 +196,16 @@ def notice_lines(view: View, width: int) -> list[Text]:
 
 
 def line_figures(view: View) -> Text:
-    """Return the poll rate in cycles per second, and the block that carries the values."""
+    """Return the poll rate in cycles per second, and the block that carries the values.
+
+    A replay has the rate of its record, whatever rate the panel requests on a line.
+    """
     rate = view.snapshot.rate if view.snapshot and not view.lost else 0.0
     wished = 1 / view.period
-    held = rate > HELD * wished or not rate
+    held = view.replayed or rate > HELD * wished or not rate
     block = view.snapshot.block.lower() if view.snapshot is not None else ""
-    cycles = figures = f"{rate:.1f} of {wished:.1f} cycles/s"
+    cycles = f"{rate:.1f} cycles/s" if view.replayed else f"{rate:.1f} of {wished:.1f} cycles/s"
+    figures = cycles
     if block:
         figures = f"{cycles} by {block}"
     text = Text(f"{figures} ", FAINT, no_wrap=True)
