@@ -399,6 +399,26 @@ def test_curve_of_the_open_drive_has_each_recorded_cycle(tmp_path: Path) -> None
     assert [at for at, value in found.items() if value == 20.0] == [PEAK]
 
 
+@pytest.mark.parametrize("device", [1, None])
+def test_trip_before_a_seek_has_its_fault_after_the_reset(
+    device: int | None, tmp_path: Path
+) -> None:
+    lft = load("atv71")["LFT"].address
+    rows = [
+        row(at + place, words, address=address)
+        for at in range(1, 450)
+        for place, address, words in (
+            (0.0, 3201, (0x0238 if 200 <= at < 230 else 0x0637, 300, 300, 84)),
+            (0.02, lft, (18 if 200 <= at < 230 else 0,)),
+        )
+    ]
+    profile = event(0.5, "profile", json.dumps({"profile": "atv71"}), 1)
+    path = record(tmp_path, *rows, events=(profile, event(200.1, "fault", "Tripped.", 1)))
+    with replayed_drive(path, 400, device) as (_, console):
+        found = [point.codes for point in console.monitor.trend if point.mark == "trip"]
+    assert found == [("ObF Overbraking",)]
+
+
 def test_curve_of_a_drive_opened_later_has_each_recorded_cycle(tmp_path: Path) -> None:
     with replayed_drive(cycles(tmp_path, range(1, 450)), 400, None) as (line, console):
         assert PEAK - 1 not in currents(console)

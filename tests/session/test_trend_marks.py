@@ -105,13 +105,28 @@ def test_write_of_any_program_is_marked_with_its_program_and_a_trip_matters_more
     assert [point.mark for point in found] == ["", "write", "", "trip", ""]
     assert found[1].by == ("run (pid 7)", "panel (pid 7)")
     assert found[1].codes == ("ACC", "DEC", "register 65000")
-    assert found[3].by == found[3].codes == ()
+    assert found[3].by == ()
+    assert found[3].codes == ("ObF Overbraking",)
 
 
 def test_write_during_a_lost_cycle_is_marked_afterwards() -> None:
     found = points((RUNNING, []), (LOST, [written(ACC, 30)]), (RUNNING, []), (RUNNING, []))
     assert [point.mark for point in found] == ["", "lost", "write", ""]
     assert found[2].codes == ("ACC",)
+
+
+def test_trip_has_its_fault_even_if_the_code_is_read_a_cycle_later() -> None:
+    late = replace(FAULT, state=replace(FAULT.state, fault=None))
+    trend = Trend(ATV71)
+    for number, cycle in enumerate((RUNNING, late, FAULT, READY)):
+        trend.add(replace(cycle, time=100.0 + number))
+    assert [(point.mark, point.codes) for point in trend.points[1:]] == [
+        ("trip", ("ObF Overbraking",)), ("", ()), ("reset", ()),
+    ]  # fmt: skip
+    unread = Trend(ATV71)
+    for number, cycle in enumerate((RUNNING, late, READY)):
+        unread.add(replace(cycle, time=100.0 + number))
+    assert unread.points[1].codes == ()
 
 
 def test_start_names_the_program_of_a_command_shortly_before_it() -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -419,6 +421,20 @@ def test_quiet_page_does_not_claim_more_than_was_read() -> None:
     assert "Not read from " in quiet(Watched(NOW - 20, gap))
     unread = tuple(replace(point, values=(None, None, None)) for point in POINTS)
     assert "another program" not in quiet(Watched(NOW - 20, unread))
+
+
+@pytest.mark.parametrize("codes", [("ObF Overbraking",), ()])
+def test_last_trip_of_the_trend_has_its_fault(codes: tuple[str, ...]) -> None:
+    """After a seek, a replay has the trip in the trend alone."""
+    trip = TrendPoint(NOW - 9, (0.0, 0.0, 50.0), "trip", (), codes)
+    faults: Any = SimpleNamespace(
+        app=SimpleNamespace(clock=SimpleNamespace(wall_of=lambda time: time)),
+        console=SimpleNamespace(monitor=SimpleNamespace(trend=(*POINTS, trip))),
+        _recorder=SimpleNamespace(since=None),
+        _last=None,
+        _journal_read=True,
+    )
+    assert FaultsScreen._watched(faults).last == SeenTrip(NOW - 9, "".join(codes), tripped=True)
 
 
 def journal_entry(session: DriveSession, answer: str, time: str, *, device: int = 0) -> Entry:

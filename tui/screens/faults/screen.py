@@ -216,10 +216,11 @@ class FaultsScreen(OrderKeys):
 
     def _watched(self) -> Watched:
         clock, points = self.app.clock, self.console.monitor.trend
-        marks = [clock.wall_of(point.time) for point in points if point.mark == "trip"]
+        trips = [point for point in points if point.mark == "trip"]
         last = self._last
-        if marks and (last is None or last.wall < marks[-1] - SAME_TRIP):
-            last = SeenTrip(marks[-1], "", tripped=True)
+        at = clock.wall_of(trips[-1].time) if trips else 0.0
+        if trips and (last is None or last.wall < at - SAME_TRIP):
+            last = SeenTrip(at, "".join(trips[-1].codes[:1]), tripped=True)
         return Watched(self._recorder.since, points, last, self._journal_read)
 
     def _alarms(self) -> list[tuple[str, int, str]]:

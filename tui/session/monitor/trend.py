@@ -51,7 +51,10 @@ class TrendPoint:
     by: tuple[str, ...] = ()
     """Programs that wrote the settings, or a command or reference in the COMMAND_REACH before."""
     codes: tuple[str, ...] = ()
-    """Settings that a `write` changed; `register N` for an address that the profile lacks."""
+    """Settings that a `write` changed; `register N` for an address that the profile lacks.
+
+    For a `trip`, its fault with code and name; empty if it was not read.
+    """
 
 
 class TrendCycle(Protocol):
@@ -174,6 +177,10 @@ class Trend:
         values = trend_values(self._codes, cycle)
         mark, by, codes = self._marker.mark(cycle, values[REFERENCE_PLACE])
         point = TrendPoint(cycle.time, values, mark, by, codes)
+        last = self.last
+        if last is not None and last.mark == "trip" and not last.codes and cycle.state is not None:
+            # the fault code may be read a cycle after the state
+            self._points[-1] = replace(last, codes=_fault_of(cycle.state))
         self._points.append(point)
         while self._points[0].time < cycle.time - TREND_SECONDS:
             self._points.popleft()
@@ -240,6 +247,8 @@ class TrendMarker:
         if mark == "write":
             codes = tuple(dict.fromkeys(code for write in writes for code in write.codes))
             return MarkedEvent(mark, _programs(writes), codes[:MOST_CODES])
+        if mark == "trip" and state is not None:
+            return MarkedEvent(mark, codes=_fault_of(state))
         if mark not in COMMANDED:
             return MarkedEvent(mark)
         recent = [item for item in self.commands if cycle.time - item.time <= COMMAND_REACH]
@@ -263,6 +272,11 @@ class TrendMarker:
             return  # an analog input changes with each cycle: only a step from rest is an event
         if abs(reference - last) >= REFERENCE_STEP:
             yield "reference"
+
+
+def _fault_of(state: DriveState) -> tuple[str, ...]:
+    """Return the present fault with code and name; empty if it was not read."""
+    return (f"{state.fault.code} {state.fault.name}".strip(),) if state.fault else ()
 
 
 def _programs(writes: Iterable[TrendWrite]) -> tuple[str, ...]:
