@@ -129,6 +129,58 @@ def words(**more: Any) -> Profile:
     )
 
 
+def _way_down(stop: int) -> list[int]:
+    """State words of a drive with two states of the kind stopping, from a run to standstill."""
+    states = [
+        ("stop", "ready", 0), ("off3", "stopping", 1), ("off2", "stopping", 4),
+        ("run", "running", 3), ("fault", "fault", 2), ("locked", "blocked", 5),
+    ]  # fmt: skip
+    steps = [
+        ("stop", "run", 0x12), ("run", "off3", 1), ("run", "off2", 4), ("locked", "run", 0x12),
+        ("off3", "stop", None), ("off2", "locked", None), ("fault", "stop", 2),
+    ]  # fmt: skip
+    drive = Exchange(
+        words(
+            states=[
+                {"id": id, "name": id, "kind": kind, "mask": 7, "value": value}
+                for id, kind, value in states
+            ],
+            transitions=[
+                {"source": source, "target": target}
+                | ({} if command is None else {"command": command})
+                for source, target, command in steps
+            ],
+            orders=[
+                {"id": "forward", "name": "Forward", "words": [0x12]},
+                {"id": "stop", "name": "Stop", "words": [1]},
+                {"id": "freewheel", "name": "Freewheel", "words": [4]},
+                {"id": "reset", "name": "Reset", "words": [2], "states": ["fault"]},
+            ],
+            interlocks=[],
+        )
+    )
+    drive.play("""
+        > 02 06 2001 07D0
+        > 02 06 2000 0012
+        . 1
+    """)
+    shown = [drive.word("STATUS") & 7]
+    drive.play(f"> 02 06 2000 {stop:04X}")
+    for _ in range(400):
+        drive.wait(0.1)
+        drive.play("> 02 03 2101 0001")
+        if (word := drive.word("STATUS") & 7) != shown[-1]:
+            shown.append(word)
+    return shown
+
+
+@pytest.mark.parametrize(("stop", "states"), [(1, [3, 1, 0]), (4, [3, 4, 5])])
+def test_drive_slows_in_the_state_that_the_transition_declares(
+    stop: int, states: list[int]
+) -> None:
+    assert _way_down(stop) == states
+
+
 def test_single_word_drive_runs_stops_trips_and_is_reset() -> None:
     Exchange(words()).play("""
         > 02 03 2100 0004

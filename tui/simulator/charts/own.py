@@ -63,6 +63,8 @@ class OwnChart:
         self._reverse = False
         self._idle: State | None = None
         """State at standstill to which the line has led; None: the initial state."""
+        self._slowing: State | None = None
+        """State of the kind stopping to which the line has led, until standstill."""
         self._pressed = False
         self._local = False
         """True if the drive is in local control, and ignores run commands of the line."""
@@ -72,7 +74,7 @@ class OwnChart:
         """Start without commands of the line."""
         self._runs = self._reverse = False
         self._stop = Stop.RAMP
-        self._idle = None
+        self._idle = self._slowing = None
         self._orders.forget()
 
     # Commands from outside
@@ -149,6 +151,11 @@ class OwnChart:
 
     def _rest_in(self, chart: Chart, id: str) -> None:
         state = next(item for item in chart.states if item.id == id)
+        self._slowing = state if state.kind == "stopping" else None
+        if state.kind == "stopping":
+            # the state that the drive reaches by itself from there
+            ids = {s.target for s in chart.transitions if s.source == id and s.command is None}
+            state = next((item for item in chart.states if item.id in ids), state)
         self._idle = state if state.kind in REST_KINDS else self._idle
 
     def _end(self, way: Stop) -> None:
@@ -171,7 +178,7 @@ class OwnChart:
     def trip(self, stop: Stop) -> None:
         """Stop the motor as the fault demands, and discard the commands of the line."""
         self._end(stop)
-        self._idle = None
+        self._idle = self._slowing = None
 
     def reset_fault(self) -> None:
         """Clear the fault if its cause is removed; a closed run input starts the motor again."""
@@ -202,6 +209,11 @@ class OwnChart:
             return False
         return self._runs or self._wired
 
+    @property
+    def _moving(self) -> bool:
+        """True if the motor is supplied or coasts."""
+        return self._body.turning or abs(self._body.motor.rotor) > OWN_REACHED_HZ
+
     def order(self) -> MotorDemand:
         """Return the present demand on the motor."""
         body = self._body
@@ -209,6 +221,7 @@ class OwnChart:
         up, down = body.rates(way)
         base = MotorDemand(acceleration=up, deceleration=down)
         if self._ordered:
+            self._slowing = None
             self._target_hz = self._wanted()
             return replace(base, energised=True, target=self._target_hz)
         self._target_hz = 0.0
@@ -240,6 +253,8 @@ class OwnChart:
         found = None
         if self._body.fault is not None:
             found = state_of_kind(chart, "fault")
+        elif self._slowing is not None and self._moving and not self._ordered:
+            found = self._slowing
         elif self._body.motor.energised or self._body.motor.braking:
             kinds = ("running",) if self._ordered else ("stopping", "running")
             found = state_of_kind(chart, *kinds)
