@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,7 @@ import pytest
 from tests.session.test_command import bench
 from tui.drive.errors import ProfileError
 from tui.drive.profile import library
+from tui.drive.profile.address_rule import fill_addresses
 from tui.drive.profile.csv_file import profile_from_table
 
 from .commands import ended
@@ -46,6 +48,14 @@ async def test_guide_leads_from_the_table_to_a_motor_that_runs(tmp_path: Path) -
         await made.let_go_until(lambda: made.stopped)
 
 
+def test_hexadecimal_code_with_a_number_or_an_address_is_right() -> None:
+    table = "code,name,number,address\nA8,Ramp,16#A8,\nF07,Top,7,\nB1,Word,,9\n1E,Low,,16#1E\n"
+    text = profile_from_table(table, "own", "t.csv", "number - 1")
+    tables = tomllib.loads(text)
+    assert fill_addresses(tables) == []
+    assert [row["address"] for row in tables["parameters"]] == [0xA7, 6, 9, 0x1E]
+
+
 @pytest.mark.parametrize(
     ("table", "reason"),
     [
@@ -63,6 +73,15 @@ async def test_guide_leads_from_the_table_to_a_motor_that_runs(tmp_path: Path) -
         ("code,name,max\nA,Ramp,inf\n", "max 'inf' is not a number"),
         (f"code,name\nA,{'x' * 200_000}\n", "t.csv:2: it is not a table"),
         ("code,name,function\nA,Ramp,5\n", "function '5' is not 1, 2, 3 or 4"),
+        (
+            "code,name\nA8,Ramp\n",
+            "A8: this code may be hexadecimal. Give its number, such as 16#A8",
+        ),
+        ("code,name,address\n1f,Ramp,number - 1\n", "such as 16#1F or 1, or its address"),
+        (
+            "code,name\n2103H,Ramp\n",
+            "2103H: this code may be hexadecimal. Give its number, such as 16#2103 or 2103",
+        ),
         ("code,name,mask\nA,Ramp,all\n", "mask 'all' is not a number"),
     ],
 )

@@ -45,7 +45,9 @@ def begin_profile(
     known = {item.id: item for item in (*library.listings(), *library.public_listings())}
     new_id = words[0].strip()
     if new_id in known:
-        raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")
+        text = f"There is a profile {new_id} already: {known[new_id].path}."
+        delete = ", or delete this file" if known[new_id].own else ""
+        raise click.UsageError(f"{text} Use another id{delete}.")
     if sheet is not None:
         text = _from_eds(given[0], new_id, rules)
     else:
@@ -59,7 +61,9 @@ def begin_profile(
         with path.open("x", encoding="utf-8") as file:
             file.write(text)
     except FileExistsError:
-        raise click.UsageError(f"{path} already exists; nothing was written.") from None
+        raise click.UsageError(
+            f"{path} already exists; nothing was written. Use another id, or delete the file."
+        ) from None
     if as_json:
         print_json(ProfileBegun(id=new_id, from_=start, file=str(path)))
         return

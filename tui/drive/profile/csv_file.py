@@ -188,6 +188,13 @@ def _converted(row: dict[str, str]) -> dict[str, Any]:
     found: dict[str, Any] = {"code": code, "name": row["name"], "number": row.get("number", code)}
     if address := row.get("address"):
         found["address"] = _address(address)
+    if "number" not in row and not isinstance(found.get("address"), int) and _is_hex(code):
+        # a rule would take the decimal digits alone: 8 of A8
+        digits, plain = code.upper().rstrip("H"), re.sub("[^0-9]", "", code)
+        raise ValueError(
+            f"{code}: this code may be hexadecimal. Give its number, such as 16#{digits} or"
+            f" {plain}, or its address."
+        )
     if function := row.get("function"):
         if function not in ("1", "2", "3", "4"):
             raise ValueError(f"{code}: function {function!r} is not 1, 2, 3 or 4.")
@@ -202,6 +209,11 @@ def _converted(row: dict[str, str]) -> dict[str, Any]:
     found |= {f: row[f] for f in ("storage", "quantity", "note") if f in row}
     return {**found, "group": row.get("group", "Table"), "source": "table",
             "confidence": "unverified"}  # fmt: skip
+
+
+def _is_hex(code: str) -> bool:
+    """Return True if a code with letters and digits could be a hexadecimal number."""
+    return bool(re.fullmatch(r"(?=.*[0-9])(?=.*[A-Fa-fHh])[0-9A-Fa-f]+[Hh]?", code))
 
 
 def _address(text: str) -> int | str:
