@@ -3,26 +3,32 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import pytest
 from click.testing import CliRunner
 
 from tui.cli.main import main
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import ProfileData
 from tui.simulator.charts.own import OwnChart
 from tui.simulator.proving.drive_steps import drive_steps
 from tui.simulator.proving.proof_bench import ProofBench
 from tui.simulator.proving.proof_steps import command_steps, prove_profile
+from tui.simulator.proving.untested import untested
 from tui.simulator.registers import Registers
 
 from .exchange import Exchange
-from .test_chart_own import words
+from .test_chart_own import pump, words
 
 KINDS = Path(__file__).parents[1] / "line" / "profiles"
 MS300 = KINDS / "ms300-kind.toml"
 FAST = ("atv21", "powerdrive")
+OUTPUT = "output_frequency"
 SLOW = ("atv31", "atv312", "atv71", "proxidrive", "varmeca")
 
 
@@ -184,6 +190,53 @@ def test_result_is_printed_as_json(tmp_path: Path) -> None:
     assert right["passed"] is True
     assert len(right["steps"]) > 10
     assert (faulty["passed"], faulty["steps"], len(faulty["faults"])) == (False, [], 1)
+    assert right["not_tested"][-1].startswith("Addresses and word order: there are no [[frames]]")
+    assert faulty["not_tested"] == []
+    printed = CliRunner().invoke(main, ["profiles", "--prove", str(MS300)]).output.splitlines()
+    assert printed[-1] == f"not tested: {right['not_tested'][-1]}"
+
+
+def _without_role(tables: dict[str, Any], role: str) -> None:
+    for row in tables["parameters"]:
+        if row.get("quantity") == role:
+            del row["quantity"]
+
+
+def _without_reverse(tables: dict[str, Any]) -> None:
+    orders = tables["charts"][0]["orders"]
+    orders[:] = [order for order in orders if order["id"] != "reverse"]
+
+
+def _without_references(tables: dict[str, Any]) -> None:
+    del tables["references"]
+    _without_role(tables, "command_frequency")
+
+
+LACKS: dict[str, tuple[Callable[[dict[str, Any]], None], set[str]]] = {
+    "nothing": (lambda tables: None, set()),
+    "commands": (
+        lambda tables: tables["charts"][0].pop("orders"),
+        {"Commands and stops", "References"},
+    ),
+    "reverse": (_without_reverse, {"Reverse"}),
+    "references": (_without_references, {"References"}),
+    "the output": (lambda tables: _without_role(tables, OUTPUT), {"The output frequency"}),
+    "codes": (lambda tables: tables["faults"].pop("codes"), {"Fault numbers"}),
+    "loss": (lambda tables: tables.pop("communication_fault"), {"Communication loss"}),
+    "save": (lambda tables: tables.pop("memory"), {"Saving"}),
+    "frames": (lambda tables: tables.pop("frames"), {"Addresses and word order"}),
+}
+
+
+@pytest.mark.parametrize("lack", LACKS)
+def test_claims_that_the_file_lacks_are_not_tested(lack: str) -> None:
+    """The example of the page makes every claim."""
+    tables = msgspec.to_builtins(pump().data)
+    remove, expected = LACKS[lack]
+    remove(tables)
+    profile = Profile(msgspec.convert(tables, ProfileData))
+    found = untested(profile, list(prove_profile(profile)))
+    assert {text.partition(":")[0] for text in found} == expected
 
 
 # Reset of the simulated drive

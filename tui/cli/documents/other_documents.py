@@ -220,6 +220,8 @@ class ProofDocument(Document, kw_only=True):
     faults: list[str]
     """Faults that `--check` reports; with one, no step was carried out."""
     steps: list[ProofStepField]
+    not_tested: list[str]
+    """Subjects that no step tested, with what the file lacks: a sentence each."""
 
 
 class ProfileBegun(Document, kw_only=True):

@@ -45,9 +45,11 @@ def begin_profile(
     known = {item.id: item for item in (*library.listings(), *library.public_listings())}
     new_id = words[0].strip()
     if new_id in known:
-        text = f"There is a profile {new_id} already: {known[new_id].path}."
-        delete = ", or delete this file" if known[new_id].own else ""
-        raise click.UsageError(f"{text} Use another id{delete}.")
+        taken = known[new_id]
+        text = f"There is a profile {new_id} already: {taken.path}."
+        if taken.own:
+            raise click.UsageError(f"{text} Use another id, or delete this file.")
+        raise click.UsageError(f"{text} Use another id.")
     if sheet is not None:
         text = _from_eds(given[0], new_id, rules)
     else:

@@ -70,6 +70,8 @@ def prove_files(files: list[Path], as_json: bool, *, quiet: bool = False) -> Non
         if document.passed:
             steps = counted(len(document.steps), "1 step", "{count} steps")
             say(f"{document.file}: {steps} passed on the simulated drive. {ONLY_SIMULATED}")
+        for text in document.not_tested:
+            say(f"not tested: {text}")
     faults = [fault for document in documents for fault in document.faults]
     failed = [
         _step_line(step) for document in documents for step in document.steps if not step.passed
@@ -126,13 +128,17 @@ def _proved(path: Path) -> ProofDocument:
     """Return the result of a file; without steps if it has faults."""
     from tui.drive.profile import library
     from tui.simulator.proving.proof_steps import prove_profile
+    from tui.simulator.proving.untested import untested
 
     if faults := library.all_faults_of(path):
-        return ProofDocument(file=str(path), passed=False, faults=faults, steps=[])
+        return ProofDocument(file=str(path), passed=False, faults=faults, steps=[], not_tested=[])
     profile = library.load_file(path)
-    steps = [_field(step, path) for step in prove_profile(profile)]
+    proved = list(prove_profile(profile))
+    steps = [_field(step, path) for step in proved]
     passed = all(step.passed for step in steps)
-    return ProofDocument(file=str(path), passed=passed, faults=[], steps=steps)
+    return ProofDocument(
+        file=str(path), passed=passed, faults=[], steps=steps, not_tested=untested(profile, proved)
+    )
 
 
 def _field(step: ProofStep, path: Path) -> ProofStepField:
