@@ -190,5 +190,5 @@ def test_constants_and_tables_are_the_recorded_ones(package: str) -> None:
     none: Counter[str] = Counter()
     emptied = {name for name in texts if found[name]['""'] > recorded.get(name, none)['""']}
     assert {name: list(missing) for name, missing in gone.items() if missing} == {}, AFTER_A_CHANGE
-    assert emptied == set()
+    assert emptied == set(), AFTER_A_CHANGE
     assert len(both) >= 0.9 * len(found), f"Too few are recorded. {AFTER_A_CHANGE}"
