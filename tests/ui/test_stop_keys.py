@@ -22,7 +22,14 @@ from tui.screens.base import PanelScreen
 from tui.screens.connection.scanning import UNPROBED
 from tui.screens.dialogs.ask import Ask
 from tui.screens.frame_source import not_stopped_texts
-from tui.screens.key_dispatcher import NOBODY_TO_STOP, SCAN_STOPS
+from tui.screens.key_dispatcher import (
+    NOBODY_TO_STOP,
+    OTHERS_STOP,
+    READ_ONLY_STOPS_NONE,
+    SCAN_STOPS,
+    STILL_OPENS,
+)
+from tui.screens.open_lines import LineOpening
 from tui.session.command.commander import Commander
 from tui.session.command.stop_report import Phase
 from tui.session.connect.identify import DriveIdentity, ScanResult
@@ -191,6 +198,44 @@ async def test_stop_that_reaches_no_drive_says_so() -> None:
         assert app.take_stop_key("f9")
         await until(pilot, lambda: app.events.newest is not None)
         assert [event.text for event in app.events.events] == [NOBODY_TO_STOP]
+
+
+@pytest.mark.parametrize(
+    ("text", "drives", "expected"),
+    [
+        ("tcp:10.0.0.5", False, STILL_OPENS.format("tcp:10.0.0.5")),
+        ("tcp:10.0.0.5", True, OTHERS_STOP.format("tcp:10.0.0.5")),
+        ("replay:day.sqlite", False, NOBODY_TO_STOP),
+    ],
+)
+async def test_stop_of_all_names_the_line_that_is_still_being_opened(
+    text: str, drives: bool, expected: str
+) -> None:
+    app = fakes.app_of()
+    async with app.run_test(notifications=True) as pilot:
+        if drives:
+            app.opened = fakes.opened()
+            app.fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, fakes.console_of(None)))
+        app.opening = LineOpening(text)
+        assert app.take_stop_key("f9")
+        app.opening.end()  # the stop was given before
+        await until(pilot, lambda: app.events.newest is not None)
+        assert [event.text for event in app.events.events] == [expected]
+
+
+async def test_read_only_panel_promises_no_stop_during_a_scan() -> None:
+    app = fakes.app_of()
+    app.read_only = True
+    async with app.run_test(notifications=True) as pilot:
+        app.fleet = fleet = Fleet(FakeLine(read_only=True), Journal(Path()))
+        fleet.search = Search(range(1, 10))
+        assert app.take_stop_key("f9")
+        await until(pilot, lambda: app.events.newest is not None)
+        assert [event.text for event in app.events.events] == [READ_ONLY_STOPS_NONE]
+        assert not_stopped_texts(app, app.panel_clock.monotonic()) == (READ_ONLY_STOPS_NONE,)
+        app.connection._report_unprobed(fleet.search)
+        assert app.events.newest is not None
+        assert app.events.newest.text == READ_ONLY_STOPS_NONE
 
 
 async def test_stop_reports_a_device_without_a_known_stop() -> None:

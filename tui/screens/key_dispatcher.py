@@ -19,7 +19,7 @@ from tui.terminal.stroke import Stroke, stroke_of
 from tui.widgets.replay_bar import NO_MOTOR
 from tui.widgets.small import is_too_small
 
-from .app_port import Panel, tell_unreached
+from .app_port import Panel, tell_not_stopped, tell_unreached
 from .harmless_keys import HarmlessKeys
 from .keys.action import CONNECTION, LINE_ONLY_IN_REPLAY, NOT_IN_REPLAY
 from .keys.table import STOPS_ALL, STOPS_LIVE, STOPS_NONE
@@ -43,6 +43,18 @@ NOBODY_TO_STOP = "Nothing was stopped: no drive is known."
 NOBODY_IN_REPLAY = "Nothing was stopped: this is a replay, and no line is open."
 LIVE_STOPPED = "Stopping all drives of the live lines. The drives on this screen are a replay."
 NO_COMMAND_IN_REPLAY = "This is a replay: nothing is sent to a drive."
+STILL_OPENS = (
+    "{} is still being opened: no stop was sent there. Stop its motors at the machine, or press F9"
+    " again once its drives are found."
+)
+OTHERS_STOP = (
+    "Stopping all drives of the open lines. {} is still being opened: no stop was sent there. Stop"
+    " its motors at the machine, or press F9 again once its drives are found."
+)
+READ_ONLY_STOPS_NONE = (
+    "NOT STOPPED: the panel is read-only, so no stop is sent to any drive. Stop the motors at the"
+    " machine."
+)
 SCAN_STOPS = "Stopping all drives. The scan goes on, and stops each drive that it finds."
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 IGNORED = "Opening {}: keys are ignored until it is open. Press Esc to cancel."
@@ -194,17 +206,31 @@ class KeyDispatcher(HarmlessKeys):
         if self.hearing:
             carried_on(lambda: soon_in_loop(self, self._warn, NO_STOP_HERE))
         elif chosen is None:
-            carried_on(lambda: soon_in_loop(self, self._tell_stop_of_all, others))
+            tell = self._tell_stop_of_all
+            carried_on(lambda: soon_in_loop(self, tell, others, self._unopened()))
 
     def _warn(self, text: str) -> None:
         """Report on every screen that a stop has stopped nothing."""
         self.notify(text, severity="warning")
 
-    def _tell_stop_of_all(self, others: Mapping[Fleet, Collection[int]]) -> None:
+    def _unopened(self) -> str:
+        """Return the line that is being opened, which no stop reaches yet; empty for none."""
+        return self.opening.text if self.opening.goes_on and not self.opening.connected else ""
+
+    def _tell_stop_of_all(
+        self, others: Mapping[Fleet, Collection[int]], unopened: str = ""
+    ) -> None:
         """Report what a stop of all does not reach, or not yet, or that there is no drive.
 
-        `others` are drives of other programs, which the holder of the line stops.
+        `others` are drives of other programs, which the holder of the line stops. `unopened` is a
+        line that was still being opened.
         """
+        from tui.session.connect.line_key import is_replay
+
+        unopened = "" if is_replay(unopened) else unopened
+        if self.read_only and (self.live_fleets or unopened):
+            tell_not_stopped(self, READ_ONLY_STOPS_NONE)
+            return
         strangers = [
             device
             for fleet in self.live_fleets
@@ -214,11 +240,14 @@ class KeyDispatcher(HarmlessKeys):
         if strangers:
             tell_unreached(self, strangers)
         searches = [fleet.search for fleet in self.live_fleets if fleet.search is not None]
+        has_drives = any(others.values()) or any(fleet.sessions for fleet in self.live_fleets)
+        if unopened:
+            self._warn((OTHERS_STOP if has_drives else STILL_OPENS).format(unopened))
         if any(search.is_stopping for search in searches):
             self._warn(SCAN_STOPS)
-        elif strangers:
+        elif strangers or unopened:
             return
-        elif not any(others.values()) and not any(fleet.sessions for fleet in self.live_fleets):
+        elif not has_drives:
             self._warn(NOBODY_IN_REPLAY if self.replay is not None else NOBODY_TO_STOP)
         elif self.replay is not None:
             self._warn(LIVE_STOPPED)
@@ -321,8 +350,8 @@ class KeyDispatcher(HarmlessKeys):
 
 
 def _stop_found(fleet: Fleet) -> None:
-    """Have a scan in progress stop each drive that it finds from now on."""
-    if fleet.search is not None:
+    """Have a scan in progress stop each drive that it finds from now on, unless no stop is sent."""
+    if fleet.search is not None and not fleet.line.read_only:
         fleet.search.stops_found = True
 
 
