@@ -16,7 +16,14 @@ from textual.widgets import Input
 
 from tests.programs import rtu_tcp
 from tui.app import DrivePanelApp
-from tui.screens.connection.choices import groups, same_line
+from tui.screens.connection.choices import (
+    LIST_MARKS,
+    LineChoice,
+    ListMark,
+    choice_line,
+    groups,
+    same_line,
+)
 from tui.screens.connection.drive_list import DriveList
 from tui.screens.connection.state import QUIET
 from tui.screens.monitor.screen import MonitorScreen
@@ -269,3 +276,10 @@ def test_listed_simulated_line_is_not_repeated() -> None:
     assert [choice.text for choice in recent.choices] == ["sim:atv71@2,atv21", "tcp:plc"]
     assert len(simulated.choices) == 2
     assert serial.choices == ()
+
+
+@pytest.mark.parametrize("mark", LIST_MARKS)
+def test_style_of_a_mark_is_not_that_of_the_whole_line(mark: ListMark) -> None:
+    text = choice_line(LineChoice("/dev/ttyUSB0", "USB-RS485 adapter"), 60, mark)
+    assert not text.style
+    assert len(text.spans) == 3

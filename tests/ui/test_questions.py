@@ -321,10 +321,23 @@ async def test_only_questions_about_the_stopped_drive_end() -> None:
 # What the motor does now
 
 
-def now_text(snapshot: Snapshot | None, look: Look | None = None, passed: float = 0.0) -> str:
+def now_shown(snapshot: Snapshot | None, look: Look | None = None, passed: float = 0.0) -> Text:
     now, session = fakes.NOW + passed, fakes.console_of(None).session
     words = partial(state_words, session)
-    return motor_state_text(session.profile, snapshot, 0.5, look, now, words).plain
+    return motor_state_text(session.profile, snapshot, 0.5, look, now, words)
+
+
+def now_text(snapshot: Snapshot | None, look: Look | None = None, passed: float = 0.0) -> str:
+    return now_shown(snapshot, look, passed).plain
+
+
+def test_only_the_unknown_state_stands_out_from_the_last_known_one() -> None:
+    """The style of the first words must not be that of the whole line."""
+    text = now_shown(fakes.snapshot_of(library.load("atv71"), fakes.RUNNING), passed=5.0)
+    assert not text.style
+    assert [text.plain[span.start : span.end] for span in text.spans] == [
+        "? state unknown", "   5s ago: FORWARD",
+    ]  # fmt: skip
 
 
 def test_motor_state_is_shown_in_one_line() -> None:

@@ -88,7 +88,7 @@ def _state(kind: str, headline: str) -> Text:
 
 
 def _not_known(was: str, age: float | None) -> Text:
-    text = Text("? state unknown", ALARM, no_wrap=True)
+    text = Text(no_wrap=True).append("? state unknown", ALARM)
     if was and age is not None:
         text.append(f"   {age_text(age)} ago: {was}", STALE)
     return text

@@ -193,7 +193,7 @@ def choice_line(choice: LineChoice, width: int, mark: ListMark = "") -> Text:
     """Draw a line with its mark, and with its description if at least 6 cells are free."""
     here = bool(mark)
     sign, style = LIST_MARKS[mark]
-    text = Text(sign, style)
+    text = Text().append(sign, style)
     text.append(line_in(choice.name or choice.text, width - 2), STRONG if here else PLAIN)
     room = width - text.cell_len - 2
     if choice.description and room >= 6:
