@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..running.stop_following import carried_to_rest
 from ..shared.asking import may_ask, says_yes
 from ..shared.drive_commands import (
     arm_drive,
     arm_option,
-    carried_out,
     complain,
     need_arming,
     watched,
@@ -86,7 +86,8 @@ def prove(
             arm_drive(console)
             result = await _proved(fleet, console, turning, quiet=as_json)
             if reset and result.fault:
-                await carried_out(console.commander, lambda: console.commander.order("reset"))
+                commander = console.commander
+                await carried_to_rest(fleet, console, lambda: commander.order("reset"))
             fields = drive_fields(target.line_text, console.session)
             _tell(fields, result, reset, as_json)
             return result.as_set

@@ -15,10 +15,10 @@ from tui.drive.sentences import MAY_START
 from tui.session.patience import patience
 from tui.session.running.watching import COMMAND_POLL_INTERVAL, latest_of
 
+from ..running.stop_following import carried_to_rest
 from ..shared.drive_commands import (
     arm_drive,
     arm_option,
-    carried_out,
     need_arming,
     watched,
 )
@@ -38,6 +38,7 @@ from ..shared.say import Messages
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
+    from tui.session.fleet import Fleet
     from tui.session.work import Outcome
 
     from ..documents.document import DriveFields
@@ -50,7 +51,7 @@ def _ordered(
     command: Literal["reference", "reset"],
     target: Target,
     read_only: bool,
-    work: Callable[[DriveConsole, Messages], Coroutine[Any, Any, str]],
+    work: Callable[[Fleet, DriveConsole, Messages], Coroutine[Any, Any, str]],
     *,
     as_json: bool,
 ) -> None:
@@ -61,9 +62,9 @@ def _ordered(
     messages = Messages(as_json=as_json)
 
     async def at_console(opened: OpenLine) -> tuple[DriveFields, str]:
-        async with watched(opened, target) as (_, console):
+        async with watched(opened, target) as (fleet, console):
             arm_drive(console)
-            text = await work(console, messages)
+            text = await work(fleet, console, messages)
             messages.tell(text)
             return drive_fields(target.line_text, console.session), text
 
@@ -90,9 +91,9 @@ def reference(
     """Set a drive's reference: 30, 30.5Hz, 900rpm. Starts no motor."""
     need_arming(arm, "reference writes the drive's reference; a running motor follows it")
 
-    async def work(console: DriveConsole, _: Messages) -> str:
-        commander = console.commander
-        return (await carried_out(commander, lambda: commander.refer(text))).text
+    async def work(fleet: Fleet, console: DriveConsole, _: Messages) -> str:
+        outcome = await carried_to_rest(fleet, console, lambda: console.commander.refer(text))
+        return outcome.text
 
     _ordered("reference", target, read_only, work, as_json=as_json)
 
@@ -118,10 +119,11 @@ def reset(
 ) -> None:
     need_arming(arm, "reset writes the drive's command word and ends its fault")
 
-    async def work(console: DriveConsole, messages: Messages) -> str:
+    async def work(fleet: Fleet, console: DriveConsole, messages: Messages) -> str:
         if latest_of(console).state.kind == "fault":
             messages.tell(await _follows(console))
-        outcome = await carried_out(console.commander, lambda: console.commander.order("reset"))
+        commander = console.commander
+        outcome = await carried_to_rest(fleet, console, lambda: commander.order("reset"))
         await _out_of_fault(console, outcome)
         name, _, came = outcome.text.partition(":")
         now = came.partition(";")[2]

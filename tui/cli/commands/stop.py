@@ -5,18 +5,18 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
 import click
 
 from tui.bus.api import LineStatus, ModbusLine, Priority
-from tui.bus.errors import DeviceException, LineError, LineLost
-from tui.drive.chart import watched_codes
+from tui.bus.errors import LineError, LineLost
 from tui.drive.orders import INSTEAD, deciding_codes
 from tui.session.connect.addresses import parse_addresses
 
+from ..running.stop_following import ended, status_of_failed
 from ..running.stop_targets import (
     StoppableDrive,
     StopWish,
@@ -44,7 +44,6 @@ from ..shared.registration import WRITING, command
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
     from tui.session.command.stop import Stopper
-    from tui.session.command.stop_report import StopReport
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
@@ -55,7 +54,6 @@ NOT_ANSWERED = (
     "NOT STOPPED yet: device {device} has not answered for {seconds:g} s. The stop is repeated."
     " Stop it at the machine."
 )
-STOP_POLL_INTERVAL = 0.05
 NAMES_NO_FAMILY = (
     "Device {}: NOT STOPPED: it does not identify itself. Name its profile with -p (see drivepanel"
     " profiles), or stop it at the machine."
@@ -139,26 +137,6 @@ def has_order(session: DriveSession, order: OrderId) -> bool:
     return any(item.id == order for chart in charts for item in chart.orders)
 
 
-async def ended(
-    stopper: Stopper, device: int, warn: Callable[[str], None] = lambda _: None
-) -> StopReport:
-    """The report of a stop that was ordered, once nothing more is awaited.
-
-    `warn` gets at once why a motor is not going to stop, as far as is known.
-    """
-    from tui.session.command.stop_report import OVER, Phase
-
-    warned = False
-    while True:
-        report = stopper.reports[device]
-        if report.phase in OVER:
-            return report
-        if report.phase is Phase.UNHEEDED and not warned:
-            warned = True
-            warn(report.text)
-        await asyncio.sleep(STOP_POLL_INTERVAL)
-
-
 @asynccontextmanager
 async def silence_reported(line: ModbusLine, device: int) -> AsyncIterator[None]:
     """Report once, while this goes on, that a drive has not answered its stop."""
@@ -215,23 +193,10 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
         telling.stopped(session, f"{who}: {with_other_way(report.text, order, way)}.")
         await asyncio.to_thread(forget_start, session)
         return 0
-    status = await _why(session)
+    status = await status_of_failed(session)
     profile = None if session.guessed else session.profile.id
     telling.failed(session.device, profile, f"{who}: {report.text}", status)
     return status
-
-
-async def _why(session: DriveSession) -> int:
-    """The status of a stop that failed: whether the drive answers at all."""
-    from tui.session.read.reader import Reader
-
-    try:
-        await Reader(session).read(watched_codes(session.profile)[:1])
-    except DeviceException:
-        return DRIVE_REFUSED
-    except LineError:
-        return LINE_TROUBLE
-    return DRIVE_REFUSED
 
 
 async def _stop_all(wish: StopWish, named: Sequence[int]) -> int:

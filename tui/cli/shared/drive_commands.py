@@ -125,7 +125,8 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     if outcome is None:
         raise Failure("Not sent: superseded by a newer command.", REFUSED_HERE)
     if outcome.kind is OutcomeKind.REFUSED:
-        raise Failure(outcome.text + _way_on(outcome.error), _status(outcome.error))
+        text = outcome.text + _way_on(outcome.error)
+        raise Failure(text, _status(outcome.error)) from outcome.error
     return outcome
 
 
