@@ -26,6 +26,11 @@ def test_status_shows_each_word_with_its_bits() -> None:
     assert command.endswith("16#0000  Command word: no bit set")
 
 
+def test_word_with_unnamed_bits_only_is_not_called_empty() -> None:
+    rows = dict(word_rows(PROFILE, readings_of(PROFILE, {**RAWS, "CMI": 1 << 14}, NOW)))
+    assert rows["CMI"].endswith("Extended command word: no named bit set")
+
+
 def test_json_has_the_words_of_each_family_by_quantity() -> None:
     words = json.loads(run(0, "status", "sim:atv71", "--json"))["words"]
     assert words["status_word"] == {

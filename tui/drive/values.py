@@ -162,6 +162,11 @@ def set_bits(bits: Sequence[Bit], word: int) -> list[Bit]:
     return [bit for bit in bits if word >> bit.bit & 1]
 
 
+def without_named_bits(word: int) -> str:
+    """Return the text of a word of whose named bits none is 1."""
+    return "no named bit set" if word else "no bit set"
+
+
 def encode(
     parameter: Parameter, text: str, names: Mapping[int, str], scale: Decimal | None
 ) -> Conversion:

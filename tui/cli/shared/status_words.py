@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from tui.drive.communication_words import communication_words
-from tui.drive.values import NOT_AVAILABLE, set_bits
+from tui.drive.values import NOT_AVAILABLE, set_bits, without_named_bits
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -79,7 +79,8 @@ def word_rows(profile: Profile, readings: Mapping[str, Reading]) -> list[tuple[s
         if reading is None or reading.raw is None or reading.quality != "good":
             rows.append((parameter.code, NOT_AVAILABLE))
             continue
-        bits = ", ".join(bit.name for bit in set_bits(parameter.bits, reading.raw)) or "no bit set"
+        names = ", ".join(bit.name for bit in set_bits(parameter.bits, reading.raw))
+        bits = names or without_named_bits(reading.raw)
         rows.append((parameter.code, f"{reading.text}  {parameter.name}: {bits}"))
     return rows
 

@@ -9,7 +9,7 @@ from tui.drive.profile.schema import Parameter
 from tui.drive.settings.factory import factory_is_sure
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
 from tui.drive.taught_profile import why_not_taught
-from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
+from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits, without_named_bits
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE, STRONG, age_text
@@ -78,7 +78,7 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
             old=lambda _, age: f"{age_text(age)} ago",
             missing="",
         )
-        found.append(f"{when}: {names or 'no bit set'}")
+        found.append(f"{when}: {names or without_named_bits(held.raw)}")
     # a profile's note on a word without a scale says that it is shown raw
     if parameter.note and parameter.code not in editor.session.profile.taught:
         found.append(parameter.note)
