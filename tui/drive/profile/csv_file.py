@@ -58,6 +58,7 @@ format = "8N1"
 [[functions]]
 code = 3
 name = "Read holding registers"
+# Most words of one request, a guess: raise it to the limit of the manual.
 max_read = {most}
 
 [[functions]]
