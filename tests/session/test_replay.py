@@ -24,6 +24,7 @@ from tui.bus.errors import (
     RequestRefused,
 )
 from tui.bus.link import SerialLink
+from tui.bus.poll_plan import PlannedRead
 from tui.drive.profile.library import load
 from tui.session import replay
 from tui.session.connect.identify import DriveIdentity
@@ -34,9 +35,10 @@ from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.trend import Trend
 from tui.session.record.history import read_history
 from tui.session.record.record_file import RecordFile
+from tui.session.record.repeated_cycles import cycles_of
 from tui.session.record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from tui.session.record.replay_text import open_replay, parse_replay, time_in
-from tui.session.record.schema import EventRow, ReplyRow
+from tui.session.record.schema import GOOD, SILENT, EventRow, ReplyRow
 from tui.session.replay import UnwrittenJournal, open_past, pass_lead, take_drives
 from tui.session.replay_past import RecordedCycles, recall_past
 from tui.session.shown import Quality
@@ -417,6 +419,32 @@ def test_trip_before_a_seek_has_its_fault_after_the_reset(
     with replayed_drive(path, 400, device) as (_, console):
         found = [point.codes for point in console.monitor.trend if point.mark == "trip"]
     assert found == [("ObF Overbraking",)]
+
+
+@pytest.mark.parametrize("at", [40.3, 40.8])
+@pytest.mark.parametrize("device", [1, None])
+def test_seek_ends_between_two_seconds(at: float, device: int | None, tmp_path: Path) -> None:
+    path = cycles(tmp_path, [round(0.25 * number, 2) for number in range(4, 200)])
+    with replayed_drive(path, at, device) as (line, _):
+        assert line.clock.monotonic() == pytest.approx(BEGIN + at, abs=1e-3)
+        reply = asyncio.run(line.read(1, 3201, 1))
+    assert reply.time == pytest.approx(BEGIN + at - 0.05, abs=1e-3)
+
+
+def test_cycles_without_a_reply_are_cycles_too(tmp_path: Path) -> None:
+    """A silent drive fails the next cycle as well, whatever that requested first."""
+    rows = [
+        row(1, (10,)),
+        row(2, registers=1, quality=SILENT),
+        row(3, registers=1, quality=SILENT, address=900),
+        row(4, (12,)),
+        row(5, (1,), address=900),
+    ]
+    with replayed(record(tmp_path, *rows), 6) as line:
+        found, is_end = cycles_of(line, 1, BEGIN, [PlannedRead(100, 1)])
+    assert is_end
+    assert [(cycle.begun + 10_000) / 1e6 - BEGIN for cycle in found] == [1, 2, 3, 4]
+    assert [cycle.last.quality for cycle in found] == [GOOD, SILENT, SILENT, GOOD]
 
 
 def test_curve_of_a_drive_opened_later_has_each_recorded_cycle(tmp_path: Path) -> None:
