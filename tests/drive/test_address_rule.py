@@ -19,6 +19,8 @@ from tui.drive.profile.address_rule import RuleError, address_by_rule
         ("256 * menu + item", "01-12", 0x010C),  # as a Delta guide counts
         ("16#1000 + 100 * menu + item", "1.05", 0x1069),
         ("16#100 + number", "16#1F", 0x11F),
+        ("number - 1", "2103H", 0x2102),
+        ("number - 1", "0xA8", 0xA7),
         ("(number - 1) % 1000 // 2", "2021", 10),
         (" 0x20 + number", "P 3", 0x23),
     ],

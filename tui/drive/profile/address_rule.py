@@ -2,8 +2,8 @@
 
 A rule is an arithmetic text over the manual's number of a parameter. `number` is that number
 without other signs: 303 for 3-03. `menu` and `item` are the parts before and behind the dash, the
-dot or the space: 3 and 3. Numbers may be hexadecimal, as in 16#1000. The text is parsed and never
-run.
+dot or the space: 3 and 3. Numbers may be hexadecimal, as in 16#1000; those of the manual also as
+1000H or 0x1000. The text is parsed and never run.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ _OPERATIONS: Mapping[type[ast.operator], Callable[[int, int], int]] = {
     ast.Mod: operator.mod,
 }
 _HEXADECIMAL = re.compile(r"16#(?=[0-9A-Fa-f])")
+_HEXADECIMAL_NUMBER = re.compile(r"(?:16#|0[xX])([0-9A-Fa-f]+)|([0-9][0-9A-Fa-f]*)[hH]")
 _NAMES = re.compile(r"[a-z_]")
 _PARTS = re.compile(r"(\d+)[-. ](\d+)")
 
@@ -60,8 +61,10 @@ EXAMPLE = "'10 * number - 1' or '16#1000 + 256 * menu + item'"
 def _known(number: str) -> dict[str, int]:
     """Return the values that a rule can use, by name."""
     text = number.strip()
+    if match := _HEXADECIMAL_NUMBER.fullmatch(text):
+        return {"number": int(match[1] or match[2], 16)}
     if _HEXADECIMAL.match(text):
-        return {"number": int(text[3:], 16)} if re.fullmatch(r"[0-9A-Fa-f]+", text[3:]) else {}
+        return {}
     found = {}
     if digits := re.sub(r"\D", "", text):
         found["number"] = int(digits[:9])
