@@ -91,7 +91,9 @@ def test_missing_order_of_two_words_gets_a_hint(tmp_path: Path) -> None:
     assert len(library.hints_of(path)) == 1
 
 
-@pytest.mark.parametrize(("added", "first"), [(40001, 40001), (30001, 30001), (400, None)])
+@pytest.mark.parametrize(
+    ("added", "first"), [(40001, 40001), (30001, 30001), (400, None), (40000, 40001)]
+)
 def test_numbers_of_the_manual_as_addresses_get_one_hint(
     tmp_path: Path, added: int, first: int | None
 ) -> None:

@@ -483,6 +483,11 @@ CHECKED: dict[str, tuple[str, str, str]] = {
         FRAME.format("STAT = 2 Hz"),
         "frame: 'STAT = 2 Hz': STAT has no unit.",
     ),
+    "a frame of no source": (
+        "[faults]",
+        FRAME.format("FREQ = 20.0 Hz").replace('"guide"', '"book 3"'),
+        "frame: source 'book 3' does not begin with the id of a source. Known: guide.",
+    ),
     "a frame of other registers": (
         "[faults]",
         FRAME.format("RAMP = 2.00 s"),
@@ -501,7 +506,7 @@ def test_mistake_is_refused_by_the_check_alone(tmp_path: Path, name: str) -> Non
     path.write_text(text.replace(right, wrong), "utf-8")
     found = [fault for fault in library.all_faults_of(path) if reported in fault]
     place = text.index(right) if "frame" in name else text.index(right) + len(right)
-    line = text[:place].count("\n") + 1 + 3 * ("frame" in name)
+    line = text[:place].count("\n") + 1 + 3 * ("frame" in name) + ("source" in name)
     assert [item[: len(f"{path}:{line}: ")] for item in found] == [f"{path}:{line}: "]
     assert library.faults_of(path) == []
 

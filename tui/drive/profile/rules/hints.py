@@ -129,14 +129,17 @@ def manual_numbers(data: ProfileData, _: Tables) -> Hints:
     """Yield the first of the addresses that look like numbers of the manual: 40001 for 0."""
     for function, first, needs in MANUAL_NUMBERS:
         rows = [row for row in enumerate(data.parameters) if row[1].function == function]
-        found = [row for row in rows if 0 <= row[1].address - first < NUMBERS_OF_KIND]
+        # a rule of one less than the number gives 40000 for 40001
+        found = [row for row in rows if -1 <= row[1].address - first < NUMBERS_OF_KIND]
         if 2 * len(found) > len(rows):
             index, parameter = found[0]
+            number = _number(parameter) or 0
+            if not 0 <= number - first < NUMBERS_OF_KIND:
+                number = max(parameter.address, first)
             yield (
                 ("parameters", index, "address"),
                 f"parameter {parameter.code}: addresses from {first} up are the manual's numbers:"
-                f" the wire address is the number - {first}, here {parameter.address - first}."
-                f"{needs}",
+                f" the wire address is the number - {first}, here {number - first}.{needs}",
             )
 
 

@@ -329,6 +329,13 @@ def meanings_of_frames(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             contents = frame_contents(frame)
         except FrameError:
             continue  # reported by profile_frames
+        known = [source.id for source in data.sources]
+        if frame.source.partition(" ")[0].rstrip(",;:") not in known:
+            yield (
+                ("frames", index, "source"),
+                f"frame: source {frame.source!r} does not begin with the id of a source. Known:"
+                f" {', '.join(known) or 'none, add a table [[sources]]'}.",
+            )
         last = contents.address + len(contents.words) - 1
         for place, text in enumerate(frame.means):
             at: TomlPath = ("frames", index, "means", place)
