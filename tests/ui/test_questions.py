@@ -27,9 +27,11 @@ from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import Question, hint, void_questions
 from tui.screens.frame_source import drive_now
 from tui.screens.keys.help import HelpScreen
+from tui.screens.monitor.screen import ViewSource
 from tui.screens.parameters.screen import ParametersScreen
 from tui.screens.parameters.write_keys import RestQuestion
 from tui.screens.state_words import state_words
+from tui.session.command.stop_report import Phase, StopReport
 from tui.session.fleet import FoundDrive
 from tui.session.monitor.look import Look
 from tui.session.monitor.snapshot import Snapshot
@@ -396,6 +398,33 @@ def test_question_line_and_status_bar_have_one_word_for_a_state(
     assert question[2:].startswith(f"{word} ")
     row = rows_of(fleet, fakes.NOW, connected=True)[console.device]
     assert row.words.upper() == word or row.kind == "fault"
+
+
+@pytest.mark.parametrize(
+    ("raws", "standing", "word", "phase"),
+    [
+        (fakes.RUNNING, 0.05, "STOPPING", Phase.STOPPING),
+        (fakes.RUNNING, 0.15, "FORWARD", None),  # read again since: someone has started it
+        (fakes.FAULT, 0.05, "FAULT ObF", Phase.STOPPED),
+        (fakes.READY, 0.05, "STANDBY", Phase.STOPPED),
+    ],
+)
+def test_no_screen_shows_a_run_that_is_older_than_the_standstill(
+    raws: dict[str, int], standing: float, word: str, phase: Phase | None
+) -> None:
+    """The stop reads the standstill before the next check of the drive does."""
+    raws = {**raws, **fakes.CHANNELS} | ({"ETA": 0x0250} if raws is fakes.READY else {})
+    console = fakes.console_of(fakes.snapshot_of(library.load("atv71"), raws))
+    fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, console))
+    fleet.stopper._reports[console.device] = StopReport(
+        console.device, Phase.STOPPED, "stopped", fakes.NOW - 5, fakes.NOW - standing
+    )
+    assert drive_now(console, fleet, fakes.NOW).words == word
+    assert rows_of(fleet, fakes.NOW, connected=True)[console.device].words == word
+    app = fakes.app_of()
+    app.fleet = fleet
+    reported = ViewSource(app, console)._stop(fakes.NOW)
+    assert (reported and reported.phase) == phase
 
 
 def test_unmonitored_drive_shows_the_state_of_its_checks() -> None:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from tui.session.command.stop_report import StopReport, as_seen
+
 if TYPE_CHECKING:
-    from tui.session.command.stop_report import StopReport
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.shown import Shown
@@ -27,6 +28,7 @@ def state_cell(
 ) -> tuple[str, str]:
     """Kind and words of the state; a stop in progress takes precedence."""
     if report is not None:
+        report = as_seen(report, session.profile, state, readings)
         if report.phase.value in STOP_WORDS:
             return "stop", STOP_WORDS[report.phase.value]
         shown = report.phase.value == "unheeded" or now - report.since < STOP_SHOWN

@@ -13,7 +13,7 @@ from textual.containers import Horizontal, Vertical
 from textual.events import Resize, ScreenResume
 from textual.timer import Timer
 
-from tui.session.command.stop_report import Phase, StopReport
+from tui.session.command.stop_report import Phase, StopReport, as_seen
 from tui.session.console import DriveConsole
 from tui.session.shown import Rating
 from tui.widgets.drawing import KeyLabel, key_line, key_styles
@@ -333,7 +333,11 @@ class ViewSource:
         """Return the report of this drive's latest stop; None once it is overtaken or expired."""
         fleet, session = self._app.fleet, self._console.session
         report = fleet.stopper.reports.get(session.device) if fleet else None
-        if report is None or self._is_overtaken(report):
+        if report is None:
+            return None
+        if (latest := self._console.latest) is not None and not latest.error:
+            report = as_seen(report, session.profile, latest.state, latest.readings)
+        if self._is_overtaken(report):
             return None
         return report if now - report.since < STOP_SHOWN_FOR.get(report.phase, now) else None
 

@@ -2,8 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import StrEnum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+
+    from ..drive_state import DriveState
+    from ..shown import Shown
 
 NOT_STOPPED = "NOT STOPPED: "
 """Beginning of each text about a motor that does not stop."""
@@ -67,6 +74,26 @@ class StopReport(NamedTuple):
     the kind of stop that the drive lacks. Otherwise sentences."""
     time: float
     since: float
+
+
+def as_seen(
+    report: StopReport,
+    profile: Profile,
+    state: DriveState | None,
+    readings: Mapping[str, Shown],
+) -> StopReport:
+    """Return the report to show with this state: stopping, while an older state still moves.
+
+    The stop reads the standstill itself, before the next poll or check does.
+    """
+    if report.phase is not Phase.STOPPED or state is None:
+        return report
+    if state.motion not in ("running", "stopping"):
+        return report
+    read = [readings[code].time for code in profile.data.status_codes if code in readings]
+    if not read or min(read) > report.since:
+        return report
+    return report._replace(phase=Phase.STOPPING, text="standstill was read")
 
 
 class StopSummary(NamedTuple):
