@@ -124,6 +124,7 @@ class DrivePanelApp(
         """Open the line again as a drive now wants it, and watch that drive."""
         while self.screen is not self.connection:
             self.pop_screen()
+        self.connection.stops_before = self.stops_of_all
         self.connection.start(line, device)
 
     def get_default_screen(self) -> Screen[None]:

@@ -67,6 +67,19 @@ async def test_drive_at_another_baud_is_found_and_the_line_keeps_it() -> None:
             assert any(",9600,8E1" in line for line in recent_lines())
 
 
+@pytest.mark.sweep
+async def test_stop_of_all_holds_for_the_settings_that_are_still_to_be_tried() -> None:
+    drive = DriveSpec("atv71", 1, sets={"TBR": 28})
+    with Simulation([drive], timing=LineTiming(19200, "8E1")) as simulation:
+        async with panel_on(simulation.serve_pty()) as (app, pilot):
+            app.connection.action_scan_settings()
+            first = app.connection.search
+            await until(pilot, lambda: app.connection.search not in (None, first))
+            assert app.take_stop_key("f9")
+            await until(pilot, lambda: bool(app.fleet and app.fleet.stopper.reports))
+            assert set(app.connection.found) == {1}
+
+
 async def test_drive_with_a_timeout_is_left_unpolled_only_if_confirmed() -> None:
     with Simulation([DriveSpec("atv21", 1)], timing=LineTiming(19200, "8E1")) as simulation:
         async with panel_on(simulation.serve_pty()) as (app, pilot):

@@ -16,10 +16,12 @@ from textual.events import Key, Paste
 from textual.widgets import Input
 
 from tui.app import DrivePanelApp
+from tui.bus.errors import LineLost
 from tui.bus.fake import FakeLine
 from tui.bus.shared_state import SharedState
 from tui.screens.base import PanelScreen
-from tui.screens.connection.scanning import UNPROBED
+from tui.screens.connection.line_keys import LineKeys
+from tui.screens.connection.scanning import UNPROBED, UNSCANNED
 from tui.screens.dialogs.ask import Ask
 from tui.screens.frame_source import not_stopped_texts
 from tui.screens.key_dispatcher import (
@@ -33,7 +35,7 @@ from tui.screens.open_lines import LineOpening
 from tui.session.command.commander import Commander
 from tui.session.command.stop_report import Phase
 from tui.session.connect.identify import DriveIdentity, ScanResult
-from tui.session.connect.open_line import demo_line
+from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.connect.search import Search
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
@@ -393,6 +395,53 @@ async def test_stop_of_all_during_a_scan_stops_drives_that_it_finds_afterwards(
         await until(pilot, lambda: app.fleet.search.ended == "done")  # type: ignore[union-attr]
         assert not [event for event in app.events.events if "NOT STOPPED" in event.text]
         assert not_stopped_texts(app, app.panel_clock.monotonic()) == ()
+
+
+@pytest.mark.parametrize("moment", ["connects", "open"])
+async def test_scan_stops_drives_after_a_stop_of_all_while_its_line_is_opened(
+    monkeypatch: pytest.MonkeyPatch, moment: str
+) -> None:
+    goes_on, opened = LineKeys._addresses_here, demo_line({"atv71": 30.0, "atv312": 30.0})
+
+    def opener(*_: object, **__: object) -> OpenLine:
+        if moment == "connects":
+            assert app.take_stop_key("f9")
+        return opened
+
+    def stopped(self: LineKeys) -> str:
+        if moment == "open":
+            assert app.take_stop_key("f9")
+            assert self.app.fleet is not None
+            assert self.app.fleet.search is None
+        return goes_on(self)
+
+    monkeypatch.setattr(LineKeys, "_addresses_here", stopped)
+    app = DrivePanelApp(open_line=opener, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.fleet is not None and len(app.fleet.stopper.reports) == 2)
+        assert STILL_OPENS.format("demo") in [event.text for event in app.events.events]
+        assert app.fleet is not None
+        stopper, search = app.fleet.stopper, app.fleet.search
+        await until(pilot, lambda: search is not None and search.ended == "done")
+        assert not [event for event in app.events.events if "NOT STOPPED" in event.text]
+        app.connection.action_scan()
+        await until(pilot, lambda: app.fleet.search is not search)  # type: ignore[union-attr]
+        assert not app.fleet.search.stops_found  # type: ignore[union-attr]
+        assert {report.phase for report in stopper.reports.values()} <= {
+            Phase.STOPPING,
+            Phase.STOPPED,
+        }
+
+
+async def test_stop_of_all_before_a_line_that_does_not_open_is_reported() -> None:
+    def refused(*_: object, **__: object) -> OpenLine:
+        assert app.take_stop_key("f9")
+        raise LineLost("no such port.")
+
+    app = DrivePanelApp(open_line=refused, start="tcp:10.0.0.5")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: bool(app.unreached[0]))
+        assert app.unreached[0] == UNSCANNED.format("tcp:10.0.0.5")
 
 
 async def test_scan_that_ends_early_after_a_stop_of_all_names_what_it_has_not_reached() -> None:

@@ -54,6 +54,8 @@ class Panel(LeanApp):
     """The monitored line as it was typed; nothing is sent on it, not even a stop."""
     drive_documents: Callable[[], DriveDocuments]
     """JSON documents of drives; imported when needed."""
+    stops_of_all: int
+    """Number of stops of all so far; counted before the drives are looked up."""
     unreached: tuple[str, float]
     """The last text about drives that a stop of all did not reach, and its monotonic time."""
     chosen: DriveConsole | None

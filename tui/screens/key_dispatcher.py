@@ -44,13 +44,9 @@ NOBODY_IN_REPLAY = "Nothing was stopped: this is a replay, and no line is open."
 LIVE_STOPPED = "Stopping all drives of the live lines. The drives on this screen are a replay."
 NO_COMMAND_IN_REPLAY = "This is a replay: nothing is sent to a drive."
 STILL_OPENS = (
-    "{} is still being opened: no stop was sent there. Stop its motors at the machine, or press F9"
-    " again once its drives are found."
+    "{} is still being opened: no stop was sent there yet. Its scan stops each drive that it finds."
 )
-OTHERS_STOP = (
-    "Stopping all drives of the open lines. {} is still being opened: no stop was sent there. Stop"
-    " its motors at the machine, or press F9 again once its drives are found."
-)
+OTHERS_STOP = f"Stopping all drives of the open lines. {STILL_OPENS}"
 READ_ONLY_STOPS_NONE = (
     "NOT STOPPED: the panel is read-only, so no stop is sent to any drive. Stop the motors at the"
     " machine."
@@ -68,6 +64,7 @@ class KeyDispatcher(HarmlessKeys):
         super().__init__()
         self._stops = 0
         self._trying_f12 = False
+        self.stops_of_all = 0
         self.unreached = ("", 0.0)
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
@@ -188,6 +185,9 @@ class KeyDispatcher(HarmlessKeys):
         except Exception:
             log.exception("which drive is open is not known: every drive is stopped")
             chosen = None
+        if chosen is None:
+            # first: a scan that begins later looks at the count, after it is in its fleet
+            self.stops_of_all += 1
         for fleet in every_fleet(self):
             try:
                 if chosen is None:
@@ -215,7 +215,8 @@ class KeyDispatcher(HarmlessKeys):
 
     def _unopened(self) -> str:
         """Return the line that is being opened, which no stop reaches yet; empty for none."""
-        return self.opening.text if self.opening.goes_on and not self.opening.connected else ""
+        scans = self.opening.connected and self.fleet is not None and self.fleet.search is not None
+        return self.opening.text if self.opening.goes_on and not scans else ""
 
     def _tell_stop_of_all(
         self, others: Mapping[Fleet, Collection[int]], unopened: str = ""

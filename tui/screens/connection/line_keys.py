@@ -68,6 +68,7 @@ class LineKeys(Scanning):
         if opening.goes_on:  # a mouse click: keys are blocked while a line opens
             self.app.tell(f"{opening.text} is being opened. Press Esc to cancel.")
         else:
+            self.stops_before = self.app.stops_of_all
             opening.begin(text, self._ask_to_open(text, device))
 
     @work(exclusive=True, group="ask", exit_on_error=False)
@@ -94,6 +95,8 @@ class LineKeys(Scanning):
         if await self.app.may_let_go(question, yes="Close", no="Cancel", always=always):
             # drives may have answered while the question was open
             self._open_next(text, device, beside=here is None and bool(self.found))
+        else:
+            self.report_unscanned(text)
 
     def _show(self, here: PanelLine, device: int | None) -> None:
         """Show an open line.
@@ -118,24 +121,30 @@ class LineKeys(Scanning):
 
     @work(exclusive=True, group="line", exit_on_error=False)
     async def _open_now(self, text: str, device: int | None, *, beside: bool) -> None:
+        scans = False
         try:
             if beside:
                 self.end_search()
                 self.warned.clear()
             else:
                 self.forget_drives()
-            if await self._opens(text):
-                self._search_for(device)
+            scans = await self._opens(text) and self._search_for(device)
         finally:
-            self.app.opening.end(get_current_worker())
+            self._end_opening(text, scans=scans)
 
-    def _search_for(self, device: int | None) -> None:
-        """Scan the opened line, or only one address."""
+    def _end_opening(self, text: str, *, scans: bool) -> None:
+        """Accept keys again; report a stop of all that no scan carries out."""
+        self.app.opening.end(get_current_worker())
+        if not scans:
+            self.report_unscanned(text)
+
+    def _search_for(self, device: int | None) -> bool:
+        """Scan the opened line, or only one address; return False for invalid addresses."""
         if device is None:
-            self.action_scan()
-        else:
-            self.form.offer_addresses(str(device))
-            self.scan([device])
+            return self.scan_form()
+        self.form.offer_addresses(str(device))
+        self.scan([device])
+        return True
 
     def tell_opening(self, text: str) -> None:
         """Show that a line is being opened, and the key that cancels this."""
@@ -172,7 +181,7 @@ class LineKeys(Scanning):
 
     @work(exclusive=True, group="line", exit_on_error=False)
     async def _start(self, text: str, device: int | None) -> None:
-        work = get_current_worker()
+        scans = False
         self._point_at(text)
         try:
             if not await self._opens(text):
@@ -180,16 +189,16 @@ class LineKeys(Scanning):
             if device is None and self.app.replay is not None and len(self.found) == 1:
                 device = next(iter(self.found))
             if device is None:
-                self.action_scan()
+                scans = self.scan_form()
                 return
-            search = self.scan([device])
-            self.app.opening.end(work)
+            search, scans = self.scan([device]), True
+            self.app.opening.end(get_current_worker())
             with suppress(WorkerError):  # ended by a key, or already reported
                 await search.wait()
                 if device in self.found:
                     await self.open_drive(device).wait()
         finally:
-            self.app.opening.end(work)
+            self._end_opening(text, scans=scans)
             leave_opening(self.app)
 
     async def _opens(self, text: str) -> bool:

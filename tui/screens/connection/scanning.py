@@ -15,7 +15,7 @@ from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.session.connect.addresses import addresses_text
-from tui.session.connect.line_key import line_key
+from tui.session.connect.line_key import is_replay, line_key
 from tui.session.connect.named_lines import profile_named
 from tui.session.paths import remember_addresses
 
@@ -35,6 +35,10 @@ NONE_AT_ADDRESSES = "No drive answered at addresses {} (2 attempts)."
 UNPROBED = (
     "NOT STOPPED: addresses {}. The scan ended before it reached them. Press s to scan, then F9."
 )
+UNSCANNED = (
+    "NOT STOPPED: {} was not scanned, and no stop was sent there. Stop its motors at the machine,"
+    " or scan it and press F9."
+)
 COMPARE_WITH_BACKUP = "Press Ctrl+D on this drive to compare. Nothing is written."
 WATCHED_ONLY = "It is monitored with that profile and cannot be armed."
 NO_SCAN_IN_REPLAY = "This is a replay: it has the drives of its record."
@@ -51,8 +55,15 @@ class Scanning(LineView):
     """True if this scan has moved the cursor to the drives."""
     unclear: frozenset[int] = frozenset()
     """Addresses whose last identification was damaged: no drive is known to answer there."""
+    stops_before = 0
+    """Stops of all before the key that led to the scan; the scan carries out later ones."""
 
     def action_scan(self) -> bool:
+        """Scan the addresses in the form, after a key; return False if that is not possible."""
+        self.stops_before = self.app.stops_of_all
+        return self.scan_form()
+
+    def scan_form(self) -> bool:
         """Scan the addresses in the form; drives already found stay.
 
         If no line is open or the addresses are invalid, show that and return False.
@@ -93,10 +104,22 @@ class Scanning(LineView):
         look = MasterDetector(fleet.line).look
         now = fleet.clock.monotonic
         search = fleet.search = Search(devices, patient=patient, once=once, between=look, now=now)
+        if self._is_to_stop() and not fleet.line.read_only:
+            search.stops_found = True
+            fleet.stop_others()
         try:
             await self._carry_out(fleet, search, typed, once=once)
         finally:
             self._report_unprobed(search)
+
+    def _is_to_stop(self) -> bool:
+        """True if a stop of all came after the key that led to this scan."""
+        return self.app.stops_of_all != self.stops_before
+
+    def report_unscanned(self, text: str) -> None:
+        """Report a line that is not scanned, if a stop of all came while it was being opened."""
+        if self._is_to_stop() and not is_replay(text):
+            tell_not_stopped(self.app, UNSCANNED.format(text))
 
     def _report_unprobed(self, search: Search) -> None:
         """Report the addresses that a stop of all during an ended scan has not reached."""

@@ -134,6 +134,7 @@ class OtherSettings(LineKeys):
         costs: ScanEstimate,
     ) -> None:
         """Scan at each setting until a device answers; skip settings that the port refuses."""
+        self.stops_before = self.app.stops_of_all
         self.forget_drives()
         for number, setting in enumerate(settings, start=1):
             text = f"serial:{link.path},{setting.baud},{setting.format}"
@@ -157,6 +158,7 @@ class OtherSettings(LineKeys):
                 self.app.events.add("told", f"{setting} was skipped: {error}")
                 continue
             except LineError as error:
+                self.report_unscanned(text)
                 self.fail(error)
                 return
             if self.search is None or self.search.ended != "done":
