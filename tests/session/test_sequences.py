@@ -14,6 +14,7 @@ from tests.mixer import COMMAND, HERTZ, MIXER, installed_mixer, mixer_text
 from tui.bus.errors import NoAnswer
 from tui.drive.profile import library
 from tui.drive.profile.check import examined
+from tui.drive.profile.schema import OrderId
 from tui.session.command.access import HalfSent
 from tui.session.command.stop_report import OVER, Phase
 from tui.session.fleet import Fleet
@@ -166,6 +167,28 @@ async def test_motor_is_followed_to_its_standstill_after_half_of_a_command(runs:
         else:
             assert report.phase is Phase.STOPPED
             assert texts[1:] == [], "the reason stays the newest message"
+
+
+@pytest.mark.parametrize(
+    ("order", "sent"), [("take-control", [(COMMAND, 8), STOP]), ("hand-back", [(COMMAND, 8)])]
+)
+async def test_half_of_taking_control_is_stopped_and_half_of_giving_it_back_is_not(
+    order: OrderId, sent: list[tuple[int, int]]
+) -> None:
+    """With half of the control, an old run command in the word of the line may take effect."""
+    changed = (
+        f'id = "{order}", name = "Control", words = [8, 16], states = ["ready"], waits = ['
+        '{ states = ["primed"], ms = 300 }] },\n  { id = "forward", '
+    )
+    installed_mixer(HERTZ, "", *SEQUENCE, forward("{}"), ('id = "forward", ', changed))
+    async with bench(MIXER) as made:
+        fleet = Fleet(made.line, made.console.journal, clock=made.clock)
+        fleet.take(made.session)
+        made.drive.set("STAT", 1)
+        made.commander.order(order)
+        assert "Control ended after word 1 of 2" in await made.done(OutcomeKind.REFUSED)
+        assert list(dict.fromkeys(commands(made))) == sent
+        assert bool(fleet.stopper.reports) is (STOP in sent)
 
 
 @pytest.mark.parametrize("waits", ['{ states = ["primed"] }', "{ ms = 200 }", "{}"])

@@ -42,8 +42,11 @@ LONG_WAIT = 1.0
 """Seconds from which a wait in a command is reported."""
 
 
-NOT_STOPPED_AFTER: frozenset[OrderId] = frozenset({"take-control", "hand-back"})
-"""Commands that move no motor; one that runs by another source must not stop."""
+NOT_STOPPED_AFTER: frozenset[OrderId] = frozenset({"hand-back"})
+"""Commands that give the motor to another source: one that it runs must not stop.
+
+Half of taking control is stopped: the line may have it, with an old run command in its word.
+"""
 
 
 class NotFollowed(OrderRefused):
@@ -53,7 +56,7 @@ class NotFollowed(OrderRefused):
 class HalfSent(NotFollowed):
     """A command of several words ended before its last one.
 
-    `needs_stop` is False for a command that moves no motor.
+    `needs_stop` is False for a command that gives the motor to another source.
     """
 
     def __init__(self, text: str, *, needs_stop: bool) -> None:
