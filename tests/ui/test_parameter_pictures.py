@@ -20,6 +20,7 @@ from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.parameters.detail_view import parameter_lines
 from tui.screens.parameters.edit_value import EditBits
 from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.parameters.table_view import TableLine, layout_of, row_line
 from tui.session.console import DriveConsole
 from tui.session.drive_state import DriveState
 from tui.session.events import EventLog
@@ -182,6 +183,31 @@ def done(editor: Editor) -> None:
 def compared(editor: Editor) -> None:
     editor.other = {**editor.values.raws, "ACC": 60, "HSP": 400, "TTO": 50}
     editor.other_label = "pump-2.toml"
+
+
+def test_value_that_is_just_written_is_not_staged_any_more() -> None:
+    console = editor_of(fakes.READY, armed=52.0)
+    editor = console.editor
+    assert editor is not None
+    editor.staging.stage("ACC", "7.5")
+    (edit,), busy = tuple(editor.staging.edits), False
+    editor.staging.busy = lambda: busy
+    layout = layout_of(editor, [TableLine("ACC")], 120)
+
+    def drawn() -> str:
+        row = row_line(editor, TableLine("ACC"), layout, 120, chosen=False)
+        return " ".join(line.plain for line in (row, *parameter_lines(editor, "ACC", 120, 6)))
+
+    assert "→ 7.5 s" in drawn()
+    busy = True
+    editor.session.image.confirm("ACC", edit.new, fakes.NOW)
+    for results in ({}, {"ACC": Result(edit, EditOutcome.DONE, "written", edit.new)}):
+        editor.staging.results = results
+        assert "7.5 s" in drawn()
+        assert "→" not in drawn()
+    assert f"was {edit.old_text}" in drawn()
+    busy = False
+    assert "→" in drawn(), "a value from elsewhere leaves the edit staged"
 
 
 WALL = 1_795_259_250.0

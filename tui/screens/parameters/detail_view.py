@@ -143,7 +143,7 @@ def _effect(editor: Editor, parameter: Parameter) -> list[str]:
 
 def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
     """Return its address, raw value and source."""
-    raw, edit = editor.values.raws.get(parameter.code), editor.staging.edits.get(parameter.code)
+    raw, edit = editor.values.raws.get(parameter.code), editor.staging.pending(parameter.code)
     hexadecimal = f"16#{parameter.address:04X}"
     number = parameter.number if parameter.number not in (hexadecimal, parameter.code) else ""
     wire = notations(parameter)[2].partition(" (")[0]
@@ -169,7 +169,7 @@ def _word(raw: int) -> str:
 def _news(editor: Editor, parameter: Parameter) -> Text:
     """Return the latest event: a change by another program, a refusal, a staged or old value."""
     code = parameter.code
-    edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
+    edit, result = editor.staging.pending(code), editor.staging.results.get(code)
     if code in editor.staging.changed_elsewhere:
         before = text_of(editor, parameter, editor.staging.changed_elsewhere[code])
         message = (

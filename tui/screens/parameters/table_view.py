@@ -220,7 +220,7 @@ def _code_style(parameter: Parameter, sure: bool) -> Style:
 
 def _staged(editor: Editor, code: str, width: int) -> Text:
     """Return the staged value, or the value before a write; always of the same width."""
-    edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
+    edit, result = editor.staging.pending(code), editor.staging.results.get(code)
     text = Text(no_wrap=True)
     if edit is None:
         old = old_text(editor, code)

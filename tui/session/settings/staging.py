@@ -48,6 +48,13 @@ class Staging:
             if edit.old is not None and raws.get(edit.code, edit.old) != edit.old
         }
 
+    def pending(self, code: str) -> Edit | None:
+        """Return a staged edit, unless the write in progress has put it into the drive already."""
+        edit = self.edits.get(code)
+        if edit is not None and self.busy() and self._raws.get(code) == edit.new:
+            return None
+        return edit
+
     def stage(self, code: str, typed: str) -> str:
         """Stage a typed value; return a remark to show immediately. Raises ValueRefused."""
         edits = self.edits.stage(self.session.profile, code, typed, self._raws, self._lacking)
