@@ -452,6 +452,22 @@ def test_save_is_not_promised_if_the_family_has_none() -> None:
     assert "--save" not in text
 
 
+@pytest.mark.parametrize("how", ["--arm", "--dry-run"])
+@pytest.mark.parametrize(
+    ("family", "setting", "why"),
+    [("atv21", "ACC=7.5", "You do not have to save."), ("v20", "P1120=7.5", "No available doc")],
+)
+def test_save_that_the_family_lacks_is_refused_before_anything_is_written(
+    tmp_path: Path, family: str, setting: str, why: str, how: str
+) -> None:
+    line = f"sim:{family}"
+    assert why in refused(2, "write", line, setting, "--save", how)
+    file = tmp_path / "set.toml"
+    run(0, "backup", line, file)
+    assert why in refused(2, "restore", line, file, "--save", how)
+    assert setting.partition("=")[0] not in run(0, "journal")
+
+
 @pytest.mark.sweep
 def test_dash_is_standard_output_and_standard_input() -> None:
     line = "sim:atv71@2"

@@ -41,6 +41,7 @@ from ..shared.sets import (
     counter,
     dry_run_option,
     file_argument,
+    need_way_to_save,
     result_fields,
     round_option,
     save_option,
@@ -158,6 +159,7 @@ def restore(
         if recipe is not None:
             target = target._replace(profile_id=recipe.profile.id, by_recipe=True)
         session = await connect_drive(opened, target)
+        need_way_to_save(session.profile, save=save)
         options = Options(line_settings, rating, codes_of(session, confirmed), rounded)
         values, messages = recipe.values if recipe else chosen, telling.messages
         if recipe is not None and recipe.left:

@@ -36,6 +36,7 @@ from ..shared.sets import (
     confirm_option,
     dry_run_option,
     edit_field,
+    need_way_to_save,
     result_fields,
     round_option,
     save_option,
@@ -107,11 +108,13 @@ def write(
     async def work(opened: OpenLine) -> int:
         session = await connect_drive(opened, target)
         edits = await _staged(session, typed, messages, rounded=rounded)
+        codes = [edit.code for edit in edits]
+        need_way_to_save(session.profile, codes, save=save)
         if dry_run:
             found, status = await _tell(session, edits, messages)
         else:
-            codes = codes_of(session, confirmed)
-            found, status = await _write(session, edits, codes, telling, save=save)
+            allowed = codes_of(session, confirmed)
+            found, status = await _write(session, edits, allowed, telling, save=save)
         if as_json:
             print_json(
                 WriteDocument(

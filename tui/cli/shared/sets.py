@@ -291,6 +291,23 @@ def status_of_results(results: Iterable[Result]) -> int:
     return next((status for status in order if status in statuses), DONE)
 
 
+def need_way_to_save(profile: Profile, codes: Sequence[str] = (), *, save: bool) -> None:
+    """Raise UsageError, before anything is written, if a family cannot save these settings.
+
+    Without codes, only a family that saves by a command is checked. Does nothing without `save`.
+    """
+    from tui.drive.settings.memory_orders import MemoryRefused, save_effect
+
+    if not save or (
+        not codes and any(parameter.eeprom_address for parameter in profile.parameters)
+    ):
+        return
+    try:
+        save_effect(profile, codes)
+    except MemoryRefused as refused:
+        raise click.UsageError(f"--save: {refused} Nothing was written; omit --save.") from refused
+
+
 def say_afterwards(
     messages: Messages,
     profile: Profile,
