@@ -138,6 +138,7 @@ def _way_down(stop: int) -> list[int]:
     steps = [
         ("stop", "run", 0x12), ("run", "off3", 1), ("run", "off2", 4), ("locked", "run", 0x12),
         ("off3", "stop", None), ("off2", "locked", None), ("fault", "stop", 2),
+        ("run", "stop", 8),
     ]  # fmt: skip
     drive = Exchange(
         words(
@@ -153,6 +154,7 @@ def _way_down(stop: int) -> list[int]:
             orders=[
                 {"id": "forward", "name": "Forward", "words": [0x12]},
                 {"id": "stop", "name": "Stop", "words": [1]},
+                {"id": "quick-stop", "name": "Straight to standstill", "words": [8]},
                 {"id": "freewheel", "name": "Freewheel", "words": [4]},
                 {"id": "reset", "name": "Reset", "words": [2], "states": ["fault"]},
             ],
@@ -174,7 +176,7 @@ def _way_down(stop: int) -> list[int]:
     return shown
 
 
-@pytest.mark.parametrize(("stop", "states"), [(1, [3, 1, 0]), (4, [3, 4, 5])])
+@pytest.mark.parametrize(("stop", "states"), [(1, [3, 1, 0]), (4, [3, 4, 5]), (8, [3, 0])])
 def test_drive_slows_in_the_state_that_the_transition_declares(
     stop: int, states: list[int]
 ) -> None:

@@ -126,7 +126,7 @@ class OwnChart:
         elif led is not None:
             self._go(led)
         if target and not self._runs:
-            self._rest_in(chart, target)
+            self._rest_in(chart, target, state)
 
     def _obey(self, order: Order) -> None:
         if order.id in ("forward", "reverse"):
@@ -149,9 +149,13 @@ class OwnChart:
         else:
             self._end(Stop.RAMP)
 
-    def _rest_in(self, chart: Chart, id: str) -> None:
+    def _rest_in(self, chart: Chart, id: str, before: State) -> None:
+        """Note the states until and at standstill, after a transition from the state `before`."""
         state = next(item for item in chart.states if item.id == id)
-        self._slowing = state if state.kind == "stopping" else None
+        # straight to standstill: the drive is not there before its motor is
+        turned = before.kind in ("running", "stopping") and self._stop is not Stop.FREEWHEEL
+        straight = before if turned and state.kind in REST_KINDS else None
+        self._slowing = state if state.kind == "stopping" else straight
         if state.kind == "stopping":
             # the state that the drive reaches by itself from there
             ids = {s.target for s in chart.transitions if s.source == id and s.command is None}
