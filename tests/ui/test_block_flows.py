@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from tests.sweeps import kept
 from tui.drive.blocks.wire_cost import Cost, Saving
 from tui.drive.settings.writable import AT_REST
 from tui.screens.blocks.screen import BlocksScreen
-from tui.screens.blocks.view import cost_lines
+from tui.screens.blocks.view import cost_lines, table_lines
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
@@ -315,6 +316,21 @@ async def test_p_names_the_keys_that_write_the_suggestion(
         await until(made.pilot, lambda: made.app.place == "parameters")
         await until(made.pilot, lambda: "Staged" not in shown(made.app, "said"))
         assert "Press" not in shown(made.app, "said")
+
+
+@pytest.mark.parametrize("width", [60, 80, 120, 200])
+@pytest.mark.parametrize("slots", [lambda _: None, proposed], ids=["now", "staged"])
+def test_costs_and_values_of_slots_are_not_cut(
+    slots: Callable[[BlockEditor], None], width: int
+) -> None:
+    editor = scanner()
+    slots(editor)
+    block = editor.proposals.blocks[0]
+    costs = Saving(Cost(158_300, 13), Cost(158_300, 12))
+    table = table_lines(editor, block, width // 2, None, double=False)
+    lines = [*cost_lines(editor, block, costs, width), *table]
+    assert [line.plain for line in lines if "…" in line.plain] == []
+    assert ("(+0.0 ms)" in lines[1].plain) == (slots is proposed)
 
 
 @pytest.mark.parametrize("after", [30_000, 30_049, 30_050, 30_051, 29_951])

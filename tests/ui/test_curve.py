@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
@@ -285,6 +286,32 @@ def test_mark_without_room_below_is_explained_above() -> None:
         below = f"{sign} {name} " in axis.plain or f" {name} {sign}" in axis.plain
         assert below != (f"{sign} {name}" in heading.plain)
     assert " trip " in heading.plain
+
+
+def test_name_of_a_mark_hides_no_clock_time() -> None:
+    room = arrange(60, 16, 9)
+    assert room.axis == 1
+    for before in range(5, 36, 3):
+        bare = running_view(1000.0)
+        view = marked_at(bare, {1000.0 - before: "write"})
+        heading, *_, axis = (line.plain for line in curve_lines(view, room))
+        at = axis.index("●")
+        times = curve_lines(marked_at(bare, {}), room)[-1].plain
+        for time in re.finditer(r"[\d:]+", times):
+            if at not in range(*time.span()):
+                assert time[0][-2:] in axis
+        assert "write" in heading + axis
+
+
+@pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])
+@pytest.mark.parametrize("raws", [fakes.RUNNING, fakes.REVERSE], ids=["forward", "reverse"])
+def test_values_at_the_cursor_are_whole(raws: dict[str, int], size: tuple[int, int]) -> None:
+    values = (-599.0, 120.4, -599.0) if raws is fakes.REVERSE else (50.0, 8.4, 50.0)
+    view = replace(view_of(ATV71, raws), trend=(TrendPoint(fakes.NOW, values),))
+    view = replace(view, page=page_start(fakes.NOW, view.step), cursor=fakes.NOW)
+    heading = curve_lines(view, arrange(*size, 9))[0]
+    assert heading.cell_len <= size[0]
+    assert [word for value in values if (word := f"{value:.1f}") not in heading.plain] == []
 
 
 @pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])

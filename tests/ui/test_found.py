@@ -14,6 +14,8 @@ from tui.screens.connection.drive_list import DriveList
 from tui.screens.connection.rows import about_drive, next_step
 from tui.screens.connection.state import QUIET
 from tui.screens.connection.wall import (
+    DOUBLE_ROWS,
+    SINGLE_ROWS,
     WALL_SIGNS,
     WallRow,
     aligned,
@@ -81,6 +83,19 @@ def test_narrow_row_drops_model_then_curve_then_name() -> None:
         (False, False, True),
         (False, False, False),
     ]
+
+
+@pytest.mark.parametrize("width", [58, 66, 79, 88, 119, 199])
+@pytest.mark.parametrize("two_rows", [True, False])
+def test_spare_cells_go_to_long_names_before_the_message(width: int, two_rows: bool) -> None:
+    usual = columns_for(width, two_rows=two_rows)
+    columns = columns_for(width, two_rows=two_rows, names=["Varmeca 33/34 of the west hall"])
+    assert usual.taken <= columns.taken <= width
+    layouts = {layout.message for layout in (*SINGLE_ROWS, *DOUBLE_ROWS)}
+    assert columns.name == 30 or columns.message in layouts
+    assert columns_for(79, two_rows=two_rows).name >= 12
+    for name in ("CONVEYOR WEST 12", "CONVEYOR WEST 13"):
+        assert name[-2:] in wall_line(WallRow(1, name), columns).plain.split("\n")[0]
 
 
 def test_two_rows_are_used_only_if_they_fit() -> None:

@@ -40,7 +40,14 @@ from tui.screens.keys.table import SCREENS
 from tui.screens.monitor.assembly import other_values, value_labels
 from tui.screens.parameters.parameter_list import FIRST, LAST, ParameterList, group_lines
 from tui.screens.parameters.screen import NARROW, WIDE
-from tui.screens.parameters.table_view import head_line, items_of, layout_of, row_line
+from tui.screens.parameters.table_view import (
+    LEAST_NAME,
+    LEAST_STAGED_NAME,
+    head_line,
+    items_of,
+    layout_of,
+    row_line,
+)
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import DENIES, fitted_names
 
@@ -99,6 +106,12 @@ def test_parameters_and_search_results(family: str, staged: bool) -> None:
             columns = layout.columns
             texts = [row_line(editor, i, layout, width, chosen=False).plain for i in items]
             start = 1 + columns.code + columns.number
+            end = start + columns.name
+            if any("…" in text[end : end + columns.value] for text in texts):
+                # a value is cut only if the names have no cell more than they need
+                least = LEAST_STAGED_NAME + 1 if columns.staged else LEAST_NAME
+                assert columns.name <= least, (codes[0], width)
+                assert not columns.other, (codes[0], width)
             names = [text[start : start + columns.name].rstrip() for text in texts]
             assert alike(names) == [], (codes[0], width)
             assert max(map(len, texts), default=0) <= width

@@ -357,6 +357,7 @@ def test_motor_state_is_shown_in_one_line() -> None:
     unplugged = fakes.snapshot_of(profile, fakes.RUNNING, line=fakes.LOST)
     assert now_text(unplugged).startswith("? state unknown")
     assert now_text(None) == "? state unknown"
+    assert now_text(None, fakes.look_of(fakes.RUNNING)) == now_text(running)
 
 
 def age_in_status_bar(snapshot: Snapshot | None, look: Look | None = None) -> float | None:

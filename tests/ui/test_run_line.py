@@ -14,7 +14,7 @@ from tests.limits import ENTER_COUNTS_AFTER
 from tests.sweeps import kept
 from tui.drive.profile import library
 from tui.screens.monitor import run_line
-from tui.screens.monitor.run_line import RunLine, proposed
+from tui.screens.monitor.run_line import RunLine, proposed, run_lines
 
 from . import fakes
 from .test_command_flows import Bench, bench, disarmed, output, writes
@@ -84,6 +84,17 @@ def test_last_reference_given_is_suggested_else_that_of_the_drive() -> None:
     assert proposed(profile, "", {"FRH": 500}) == ("50.0", "Hz")
     assert proposed(profile, "", {}) == ("0", "Hz")
     assert proposed(library.load("varmeca"), "", {}) == ("", "")
+
+
+@pytest.mark.parametrize("width", [60, 72, 80, 120])
+def test_run_line_shows_whole_parts(width: int) -> None:
+    profile = library.load("atv71")
+    raws = {**fakes.RUNNING, "HSP": 500, "LSP": 0, "ACC": 30, "DEC": 30, "INR": 1, "FRS": 500}
+    readings = fakes.snapshot_of(profile, raws).readings
+    _, first, _ = run_lines(LINE, profile, readings, fakes.NOW, width, output=Decimal(0))
+    assert "…" not in first.plain
+    assert not first.plain.rstrip().endswith("·")
+    assert ("reached in" in first.plain) == (width >= 80)
 
 
 def test_run_line_waits_the_moment_of_the_safety_rules() -> None:

@@ -61,7 +61,30 @@ def test_the_model_is_whole_if_there_is_room() -> None:
     assert "MACHINE 4 · ATV71HU15M3 " in strip_line(VIEW, 120).plain
     assert " 2 ATV71HU15M3 " in strip_line(VIEW._replace(drive=RUNS._replace(name="")), 80).plain
     long = VIEW._replace(drive=RUNS._replace(name="CONVEYOR WEST 12"))
-    assert strip_line(long, 80).plain.startswith(" 2 CONVEYOR…·ATV71 ▶")
+    assert strip_line(long, 80).plain.startswith(" 2 CONVEY…12·ATV71 ▶")
+
+
+@pytest.mark.parametrize("width", [60, 72, 80, 120])
+def test_names_that_differ_in_their_number_do_so_in_the_status_bar(width: int) -> None:
+    for name in ("MACHINE", "CONVEYOR WEST"):
+        drives = (RUNS._replace(name=f"{name} {number}") for number in (4, 5, 14))
+        heads = {
+            strip_line(VIEW._replace(drive=drive), width).plain.split("▶")[0] for drive in drives
+        }
+        assert len(heads) == 3
+
+
+def test_viewing_a_fault_moves_nothing() -> None:
+    view = VIEW._replace(drive=RUNS._replace(armed=None))
+    lines = [strip_line(view._replace(unseen=unseen), 80).plain for unseen in (True, False)]
+    assert lines[0] == lines[1]
+
+
+def test_old_message_over_a_dialog_uses_the_rows_that_are_reserved() -> None:
+    message = BarMessage("14:02:11", "one two three four " * 5, "told", 90.0)
+    assert len(message_lines(message, 60)) == 1
+    lines = message_lines(message, 60, rows=3)
+    assert " ".join(line.plain[10:] for line in lines).split() == message.text.split()
 
 
 def cells_before(text: str, part: str) -> int:

@@ -106,12 +106,15 @@ class Framed(Screen[Any]):
             ],
             "said": [
                 *not_stopped_lines(view.not_stopped, width),
-                *(message_lines(view.message, width, lead=lead) if news else ()),
             ],
         }
+        # the rows of the screen below stay as they are while a dialog is open
+        rows = self._rows_below() if self.is_modal else 1
+        if news:
+            room = rows - len(parts["said"])
+            parts["said"] += message_lines(view.message, width, lead=lead, rows=room)
         if self.is_modal:
-            # the rows of the screen below stay as they are while a dialog is open
-            parts["said"] += [Text("")] * (self._rows_below() - len(parts["said"]))
+            parts["said"] += [Text("")] * (rows - len(parts["said"]))
             stops = stop_keys(self.app.stop_target_text, typing=takes_space(self.focused))
             parts[DIALOG_KEYS] = [key_line(stops)]
         return parts
@@ -210,21 +213,23 @@ def not_stopped_lines(texts: Sequence[str], width: int) -> list[Text]:
     return [Text(f" {part:<{room}} ", FAULT_BLOCK, no_wrap=True) for part in parts]
 
 
-def message_lines(message: BarMessage | None, width: int, *, lead: bool = True) -> list[Text]:
+def message_lines(
+    message: BarMessage | None, width: int, *, lead: bool = True, rows: int = 1
+) -> list[Text]:
     """The message; a new one takes several lines if necessary, up to `WHOLE_LINES`.
 
-    With `lead`, the line names the key that shows more.
+    An older one takes several if there are `rows` for it. With `lead`, the line names the key that
+    shows more.
     """
     if message is None:
         return [Text("")]
     style = MESSAGE_KIND_STYLES.get(message.kind, FAINT)
     room = width - 12
-    if (
-        message.kind in WHOLE_KINDS
-        and (message.age < WHOLE_FOR or NOT_STOPPED_HEAD in message.text)
-        and len(plain(message.text)) > room - 12
-    ):
-        parts = wrapped(message.text, max(10, room), WHOLE_LINES)
+    is_whole = message.kind in WHOLE_KINDS and (
+        message.age < WHOLE_FOR or NOT_STOPPED_HEAD in message.text
+    )
+    if (is_whole or rows > 1) and len(plain(message.text)) > room - 12:
+        parts = wrapped(message.text, max(10, room), WHOLE_LINES if is_whole else rows)
         lines = []
         for number, part in enumerate(parts):
             line = Text(f" {message.when if not number else '':<8} ", FAINT, no_wrap=True)

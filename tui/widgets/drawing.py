@@ -117,6 +117,11 @@ def _without_middle(text: str, width: int) -> list[str]:
     return [f"{text[:head]}…{text[-tail:]}" for _, head, tail in sorted(found)] or [text[:width]]
 
 
+def fitted_name(name: str, width: int) -> str:
+    """Return a name in at most so many cells, shortened in its middle: its end may be a number."""
+    return fitted_names((name,), width)[name]
+
+
 def whole_sentences(text: str, width: int) -> str:
     """As many whole sentences as fit the width; the whole text if not even the first one does."""
     if len(text) <= width:

@@ -43,16 +43,23 @@ def motor_state_text(
     three cycles, or with an error, is shown as unknown, with its age.
     """
     if snapshot is None or (look is not None and look.time > snapshot.time):
-        return _by_look(look, now, words)
+        return _by_look(profile, look, now, words)
     age = max(0.0, now - snapshot.read_at)
     cycle = max(period, 1 / snapshot.rate if snapshot.rate else period)
     heard = not snapshot.error and snapshot.line.status is LineStatus.CONNECTED
     if not heard or age > stale_after(cycle) or snapshot.state.kind == "unknown":
         return _not_known(words(snapshot.state, snapshot.readings)[1], age)
-    text = _state(*words(snapshot.state, snapshot.readings))
+    return _known(profile, *words(snapshot.state, snapshot.readings), snapshot.readings, now)
+
+
+def _known(
+    profile: Profile, kind: str, headline: str, readings: Mapping[str, Shown], now: float
+) -> Text:
+    """Return a state, and the values that were read with it."""
+    text = _state(kind, headline)
     for quantity in QUANTITIES_NOW:
         parameter = profile.quantity(quantity)
-        reading = snapshot.readings.get(parameter.code) if parameter else None
+        reading = readings.get(parameter.code) if parameter else None
         if parameter is None or reading is None:
             continue
         none = (NOT_AVAILABLE, parameter.unit, STALE)
@@ -68,15 +75,15 @@ def motor_state_text(
     return text
 
 
-def _by_look(look: Look | None, now: float, words: StateWords) -> Text:
-    """Return the state from the line watch, which reads no values."""
+def _by_look(profile: Profile, look: Look | None, now: float, words: StateWords) -> Text:
+    """Return the state from the line watch, with the values that it read."""
     read = look.before if look is not None and look.error else look
     if look is None or read is None or read.state is None:
         return _not_known("", None)
     age = max(0.0, now - read.time)
     if look.error or age > stale_after(GLANCE) or read.state.kind == "unknown":
         return _not_known(words(read.state, read.readings)[1], age)
-    return _state(*words(read.state, read.readings))
+    return _known(profile, *words(read.state, read.readings), read.readings, now)
 
 
 def _state(kind: str, headline: str) -> Text:

@@ -16,7 +16,7 @@ from rich.text import Text
 from tui.drive.plain import plain
 from tui.drive.sentences import counted
 
-from .drawing import armed_text, cut, cut_at_word, short
+from .drawing import armed_text, cut, cut_at_word, fitted_name, short
 from .palette import (
     ALARM,
     ATTENTION,
@@ -36,8 +36,8 @@ from .palette import (
 from .replay_bar import ReplayView
 
 STATE_WIDTH = 14
-VALUES_WIDTH = 26
-"""Cells of `123.4 → 123.4 Hz  123.4 A`."""
+VALUES_WIDTH, NARROW_VALUES = 26, 23
+"""Cells of `123.4 → 123.4 Hz  123.4 A`, and of `123.4→123.4 Hz 123.4 A `."""
 RIGHT_WIDTH, MIDDLE_RIGHT, NARROW_RIGHT = 24, 21, 13
 """Cells reserved for the number of faults and for ARMED, by the width of the terminal."""
 NARROW, MIDDLE, WIDE = 72, 86, 100
@@ -135,13 +135,15 @@ def _line_text(line: str, room: int) -> str:
 
 def _drive(drive: DriveNow, width: int) -> Text:
     """Return identity, state and values; the identity gets the remaining room."""
-    room = max(4, min(NAME_WIDEST, width - STATE_WIDTH - VALUES_WIDTH - _right_width(width)))
+    values = NARROW_VALUES if width < NARROW else VALUES_WIDTH
+    room = max(4, min(NAME_WIDEST, width - STATE_WIDTH - values - _right_width(width)))
     who = Text(no_wrap=True)
     who.append(f"{drive.device:>2} ", FAINT)
     name, model = identity_in(drive, room - who.cell_len - 1)
     who.append(name, STRONG).append(model, FAINT)
     who.truncate(room - 1, overflow="ellipsis", pad=True)
-    return who.append(" ").append_text(_state(drive)).append_text(_values(drive))
+    who.append(" ").append_text(_state(drive))
+    return who.append_text(_values(drive, is_narrow=width < NARROW))
 
 
 LEAST_NAME = 6
@@ -160,10 +162,14 @@ def identity_in(drive: DriveNow, room: int) -> tuple[str, str]:
         return name, form
     left = room - cell_len(forms[-1])
     if left < LEAST_NAME:
-        return name, ""
-    while cell_len(name) >= left:
-        name = name[:-1]
-    return f"{name.rstrip()}…", forms[-1]
+        return _shortened(name, room), ""
+    return _shortened(name, left), forms[-1]
+
+
+def _shortened(name: str, room: int) -> str:
+    """Return a name in at most so many cells; wide characters take two."""
+    wide = cell_len(name) - len(name)
+    return fitted_name(name, max(3, room - wide))
 
 
 def _right_width(width: int) -> int:
@@ -182,14 +188,14 @@ def _state(drive: DriveNow) -> Text:
     return text
 
 
-def _values(drive: DriveNow) -> Text:
+def _values(drive: DriveNow, *, is_narrow: bool) -> Text:
     style = STRONG if drive.age is None else STALE
-    text = Text(no_wrap=True)
+    text, arrow = Text(no_wrap=True), "→" if is_narrow else " → "
     if not (drive.frequency or drive.current):
-        return text.append(" " * VALUES_WIDTH)
+        return text.append(" " * (NARROW_VALUES if is_narrow else VALUES_WIDTH))
     # one unit, after the reference: both values have it
     text.append(f"{drive.frequency:>5}", style)
-    text.append(f" → {drive.reference:>5}" if drive.reference else " " * 8, PLAIN)
+    text.append(f"{arrow if drive.reference else '':{len(arrow)}}{drive.reference:>5}", PLAIN)
     text.append(f" {drive.frequency_unit:<2}", FAINT)
     text.append(f"{drive.current:>6}", style)
     text.append(f" {short(drive.current_unit, 2):<2}", FAINT)
@@ -224,7 +230,7 @@ def _whole_line(view: StripView, room: int, *, level: int) -> Text:
     text, drive = Text(no_wrap=True), view.drive
     if view.faults:
         count = counted(view.faults, "■ 1 fault", "■ {count} faults")
-        count = f"■{view.faults}" if level else f" {count} " if view.unseen else count
+        count = f"■{view.faults}" if level else f" {count} "
         text.append(count, FAULT_BLOCK if view.unseen else FAULT).append(" ")
     if view.off_record:
         text.append("J!" if level >= LEVELS_MOST and drive is not None else "NO JOURNAL", ALARM)

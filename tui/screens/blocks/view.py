@@ -17,7 +17,7 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.mapping import BlockView, Force, Slot, wire_timing
 from tui.session.read.proof import SlotMatch
-from tui.widgets.drawing import cut, fitted_names, rule, wrapped
+from tui.widgets.drawing import cut, fitted_names, rule, short, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG
 from tui.wire.frames import hex_text
 
@@ -25,6 +25,8 @@ BOTH = 50
 """Columns from which a table also shows the directly read value."""
 INDENT = 6
 """Cells before the second line of a slot."""
+NARROW_SLOT = 72
+"""Columns below which the unit of a slot's values is omitted: they have it."""
 WIDE_SLOTS = 110
 """Columns from which each slot takes two lines."""
 VERDICT_STYLES = {
@@ -84,14 +86,17 @@ def _slot_line(
     stands = describe(profile, block, slot.raw)
     if used and slot.parameter is None:
         stands = f"{slot.raw}?"
-    text.append(cut(stands, 9 if width < BOTH else 12), PLAIN if used else FAINT)
+    cells = 9 if width < BOTH else 12
+    text.append(short(stands, cells), PLAIN if used else FAINT)
+    spare = cells - len(short(stands, cells))
     changed = proposed is not None and proposed != slot.raw
     if changed:
+        text.append(" " * spare)
         text.append(cut(f" → {describe(profile, block, proposed)}", 12), ATTENTION)
         room = width - text.cell_len
         text.append(f"{slot.text if used else '':>{max(0, min(14, room - 1))}}", FAINT)
         return _filled(text, width)
-    room = width - text.cell_len
+    room = width - text.cell_len - spare
     both = width >= BOTH
     verdict, style = _verdict(block, slot)
     value_room = max(4, (room - 9) // 2 if both else room - 9)
@@ -99,8 +104,10 @@ def _slot_line(
     if block.direction == "write" and not both:
         values, verdict = [slot.direct_text], verdict or "direct"
     for place, value in enumerate(values):
-        shown = cut(value, value_room).rstrip() if used else ""
-        text.append(f"{shown:>{value_room}}", FAINT if place else PLAIN)
+        # a long value uses the cells that its code leaves
+        least = value_room if place else value_room + spare
+        shown = short(value, max(4, least - 1)) if used else ""
+        text.append(f"{shown:>{least}}", FAINT if place else PLAIN)
     text.append(f" {verdict if used else '':<8}", style)
     return _filled(text, width)
 
@@ -167,9 +174,9 @@ def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) 
     room = max(8, width - first.cell_len - 2)
     first.append(f"  {fitted_names((parameter.name,), room)[parameter.name]}", PLAIN)
     second = Text(f" {notation_text(parameter)}", PLAIN)
-    second.append(f"   unit {parameter.unit or '-'}", FAINT)
+    second.append(f"   unit {parameter.unit or '-'}" if width >= NARROW_SLOT else "", FAINT)
     if raw == slot.raw:
-        through = "through the block" if block.direction == "read" else "last written"
+        through = "last written" if block.direction == "write" else "through the block"
         second.append(f"   {through} ", FAINT)
         second.append(slot.text, STRONG)
         second.append("   direct ", FAINT)
@@ -222,15 +229,8 @@ def cost_lines(
     if saving is None:
         text.append("not known: slots not read yet", FAINT)
     else:
-        text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
-        text.append(f" {_requests(saving.before.requests)}", FAINT)
-        if _waits_for_a_reset(block_editor):
-            text.append(" · after a reset", ALARM)
-        if block_editor.proposals.plans:
-            text.append("  → staged ", FAINT)
-            text.append(f"{_ms(saving.after.microseconds)}", STRONG)
-            text.append(f" {_requests(saving.after.requests)}", FAINT)
-            text.append(f"  ({_ms(_shown_change(saving), sign=True)})", ATTENTION)
+        forms = [_cycle_text(block_editor, saving, at) for at in range(len(CYCLE_FORMS))]
+        text = next((form for form in forms if form.cell_len <= width), forms[-1])
         whole = microseconds(profile, wire_timing(block_editor.session), inputs, outputs)
         reported = f"   one exchange {_ms(whole)}"
         if whole and text.cell_len + len(reported) <= width:
@@ -245,6 +245,31 @@ def cost_lines(
         for line in range(2)
     ]
     return [*lines, text, *frames]
+
+
+CYCLE_FORMS = (
+    ("monitoring cycle", True, True),
+    ("monitoring cycle", False, True),
+    ("monitoring cycle", False, False),
+    ("cycle", False, False),
+)
+"""Name of the cycle, and if the requests before and after are shown: the shorter, the later."""
+
+
+def _cycle_text(block_editor: BlockEditor, saving: Saving, form: int) -> Text:
+    """Return the time of a monitoring cycle now and with the staged slots."""
+    name, is_before, is_after = CYCLE_FORMS[form]
+    text = Text(f" {name} {_ms(saving.before.microseconds)}", PLAIN, no_wrap=True)
+    if is_before or (is_after and not block_editor.proposals.plans):
+        text.append(f" {_requests(saving.before.requests)}", FAINT)
+    if _waits_for_a_reset(block_editor):
+        text.append(" · after a reset", ALARM)
+    if block_editor.proposals.plans:
+        text.append("  → staged ", FAINT)
+        text.append(f"{_ms(saving.after.microseconds)}", STRONG)
+        text.append(f" {_requests(saving.after.requests)}" if is_after else "", FAINT)
+        text.append(f"  ({_ms(_shown_change(saving), sign=True)})", ATTENTION)
+    return text
 
 
 def _shown_change(saving: Saving) -> int:

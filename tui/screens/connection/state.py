@@ -205,13 +205,13 @@ class LineView(PanelScreen):
     def _table(self, fleet: Fleet) -> tuple[Mapping[int, WallRow], Mapping[int, Text], list[Text]]:
         """Return the row of each drive, its line as drawn, and the heads of the columns."""
         # imported late: speeds up the start
-        from .rows import rows_of
+        from .rows import drive_names, rows_of
         from .wall import column_heads, columns_for, wall_line
 
         width = max(20, self.drives.size.width - 1)
         now, wall = self.app.clock.monotonic(), self.app.clock.wall()
         two_rows = 2 * len(self.found) <= self.drives.size.height
-        columns = columns_for(width, two_rows=two_rows)
+        columns = columns_for(width, two_rows=two_rows, names=drive_names(fleet))
         curves: Mapping[int, tuple[str, ...]] = {}
         scale: float | None = None
         if columns.curve:

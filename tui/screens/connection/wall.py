@@ -12,7 +12,7 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.drive.sentences import counted
-from tui.widgets.drawing import cut, short
+from tui.widgets.drawing import cut, fitted_name, short
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
@@ -107,7 +107,7 @@ SINGLE_ROWS = (
     WallColumns(20, 16, 14, 16, 42, 38),
     WallColumns(14, 14, 13, 0, 24, 26),
     WallColumns(12, 0, 13, 0, 18, 24),
-    WallColumns(11, 0, 13, 0, 12, 20),
+    WallColumns(12, 0, 13, 0, 12, 19),
     WallColumns(10, 0, 12, 0, 12, 6),
     WallColumns(9, 0, 11, 0, 6, 8),
     WallColumns(9, 0, 12, 0, 0, 8),
@@ -119,21 +119,24 @@ DOUBLE_ROWS = (
     WallColumns(20, 0, 16, 20, 42, 46, 2),
     WallColumns(14, 0, 16, 15, 24, 26, 2),
     WallColumns(12, 0, 13, 0, 18, 24, 2),
-    WallColumns(12, 0, 13, 0, 12, 19, 2),
+    WallColumns(13, 0, 13, 0, 12, 18, 2),
 )
 """The same with two rows."""
 TICKS = 6
 """Parts of the page of a curve; dots below a curve are between them."""
 
 
-def columns_for(width: int, *, two_rows: bool = False) -> WallColumns:
-    """Return the widest layout that fits; spare cells go to the message.
+def columns_for(width: int, *, two_rows: bool = False, names: Sequence[str] = ()) -> WallColumns:
+    """Return the widest layout that fits; spare cells go to long `names`, then to the message.
 
     Two rows for a drive are used only if they fit.
     """
     layouts = (*(DOUBLE_ROWS if two_rows else ()), *SINGLE_ROWS)
     found = next((layout for layout in layouts if layout.taken <= width), SINGLE_ROWS[-1])
     spare = max(0, width - found.taken)
+    if found.name:
+        wider = min(spare, max(0, max(map(len, names), default=0) - found.name))
+        found, spare = found._replace(name=found.name + wider), spare - wider
     return found._replace(message=min(WIDEST_MESSAGE, found.message + spare))
 
 
@@ -220,9 +223,10 @@ def _first_row(row: WallRow, columns: WallColumns) -> Text:
     text.append(f"{row.device:>{DEVICE}}", FAINT)
     if columns.name:
         named = row.name if columns.model or row.name else row.model
-        text.append(f" {cut(named, columns.name)}", STRONG if row.name else PLAIN)
+        name = fitted_name(named, columns.name)
+        text.append(f" {name:<{columns.name}}", STRONG if row.name else PLAIN)
     if columns.model:
-        text.append(f" {cut(row.model, columns.model)}", FAINT)
+        text.append(f" {fitted_name(row.model, columns.model):<{columns.model}}", FAINT)
     text.append(" ")
     state = f"{WALL_SIGNS.get(row.kind, '□')} {short(row.words, columns.state - 2)}"
     block = row.kind in ("fault", "stop failed")
@@ -261,7 +265,8 @@ def _message(row: WallRow, columns: WallColumns) -> str:
 
 def _second_row(row: WallRow, columns: WallColumns) -> Text:
     text = Text(" " * DEVICE, no_wrap=True, overflow="ellipsis")
-    text.append(f" {cut(row.model if row.name else '', columns.name)}", FAINT)
+    model = fitted_name(row.model, columns.name) if row.name else ""
+    text.append(f" {model:<{columns.name}}", FAINT)
     text.append(" " * (columns.state + 1))
     old = spaced_age(row.age) if row.old else ""
     if row.reference and not old:

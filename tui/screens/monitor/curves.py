@@ -57,6 +57,8 @@ from .time_axis import (
 from .view import View, directed, end_of
 
 NAMES: dict[Quantity, str] = {"output_frequency": "output", "motor_current": "current"}
+READ_OUT_WHOLE = 74
+"""Columns from which the values at the cursor have their whole names."""
 
 
 class Band(NamedTuple):
@@ -91,7 +93,7 @@ def curve_lines(view: View, room: Arrangement) -> list[Text]:
     columns = room.width - LABEL_CELLS - 1 - MARGIN_CELLS
     points = points_of_page(view)
     page = ShownPage(view, points, columns, marks_on_page(view, points, columns))
-    names = mark_names(page)
+    names = mark_names(page, on_axis=room.axis == 1)
     unnamed = {mark for mark in page.marks.values() if mark not in names}
     lines = [_heading(view, found[0], unnamed, room.width)]
     lines += _band_lines(page, found[0], room.plot)
@@ -229,7 +231,8 @@ def _sample(dots: str, style: Style, view: View) -> Text:
 
 def _read_out(view: View, moment: float, width: int) -> Text:
     """Return the values at the moment of the cursor, with the time at which they were read."""
-    text = Text(no_wrap=True)
+    text, is_narrow = Text(no_wrap=True), width < READ_OUT_WHOLE
+    between, cells, last = (" ", 6, "ref") if is_narrow else ("   ", 7, "reference")
     found, points = None, points_of_page(view)
     for place, quantity in enumerate(TREND_QUANTITIES):
         parameter = readout_parameter(view.profile, quantity)
@@ -237,13 +240,12 @@ def _read_out(view: View, moment: float, width: int) -> Text:
             continue
         item = sample_at(samples_of(points, place), moment, reach_of(view))
         found = found or item
-        name = NAMES.get(quantity, "reference")
-        text.append(f"   {name} ", FAINT)
+        text.append(f"{between}{NAMES.get(quantity, last)} ", FAINT)
         value = None if item is None else item[1]
         if value is None:
-            text.append(f"{NOT_AVAILABLE:>7}", FAINT)
+            text.append(f"{NOT_AVAILABLE:>{cells}}", FAINT)
         else:
-            text.append(f"{value:>7.{possible_decimals(parameter)}f}", STRONG)
+            text.append(f"{value:>{cells}.{possible_decimals(parameter)}f}", STRONG)
         text.append(f" {parameter.unit or 'raw'}", FAINT)
     at = found[0] if found is not None else moment
     head = Text(f" {clock_text(at + view.apart)}", PLAIN if found is not None else STALE)

@@ -198,7 +198,8 @@ def run_lines(
     is the motor's frequency in Hz, negative in reverse; None if it is not known.
     """
     reported = [Text(f" {part}", style) for part, style in _parts_of(line, hindrance, width - 2)]
-    lines = [*(reported or [Text("")]), _first(line, profile, readings, output), _second(line, now)]
+    first = _first(line, profile, readings, output, width)
+    lines = [*(reported or [Text("")]), first, _second(line, now)]
     for text in lines:
         text.no_wrap = True
         text.truncate(width, overflow="ellipsis")
@@ -224,9 +225,13 @@ def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Styl
 
 
 def _first(
-    line: RunLine, profile: Profile, readings: Mapping[str, Shown], output: Decimal | None
+    line: RunLine,
+    profile: Profile,
+    readings: Mapping[str, Shown],
+    output: Decimal | None,
+    width: int,
 ) -> Text:
-    """Return the effect of Enter, the typed reference, and its limits."""
+    """Return the effect of Enter, the typed reference, and what fits of its limits and ramp."""
     first = Text(" ")
     first.append(RUN_HEADINGS[line.purpose], STRONG)
     if not line.unit:
@@ -234,7 +239,12 @@ def _first(
     first.append(" at ", STRONG)
     first.append(f" {line.text:>{DIGITS_MOST}} ", "bold white on #101214")
     first.append(f" {line.unit}  ", PLAIN)
-    return first.append(_around(line, profile, readings, output), FAINT)
+    for number, part in enumerate(_around(line, profile, readings, output)):
+        text = f" · {part}" if number else part
+        if first.cell_len + len(text) > width:
+            break
+        first.append(text, FAINT)
+    return first
 
 
 def _second(line: RunLine, now: float) -> Text:
@@ -253,7 +263,7 @@ def _second(line: RunLine, now: float) -> Text:
 
 def _around(
     line: RunLine, profile: Profile, readings: Mapping[str, Shown], output: Decimal | None
-) -> str:
+) -> list[str]:
     """Return the known limits, ramp time and time to the reference."""
     parts = []
     low, high, code = limits(profile, readings)
@@ -265,7 +275,7 @@ def _around(
         reaches = line.unit == "Hz" and line.purpose != "reference" and not line.fault
         if reaches and not line.is_zero and output is not None:
             parts += _there_in(line, profile, readings, output)
-    return " · ".join(parts)
+    return parts
 
 
 def _there_in(

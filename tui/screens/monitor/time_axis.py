@@ -117,12 +117,13 @@ class MarkName(NamedTuple):
     text: str
 
 
-def mark_names(page: ShownPage) -> dict[TrendMark, MarkName]:
+def mark_names(page: ShownPage, *, on_axis: bool) -> dict[TrendMark, MarkName]:
     """Return the name of each mark, at the first of its signs that has room for it.
 
-    A name never covers a sign.
+    A name never covers a sign, nor a clock time that is `on_axis` with the marks.
     """
-    taken = [False] * (page.columns + MARGIN_CELLS)
+    times = clock_times(page, page.marks.keys()) if on_axis else " " * (page.columns + MARGIN_CELLS)
+    taken = [cell != " " for cell in times]
     for column in page.marks:
         taken[column] = True
     found: dict[TrendMark, MarkName] = {}
@@ -151,10 +152,7 @@ def axis_lines(page: ShownPage, rows: int, names: Mapping[TrendMark, MarkName]) 
     cells += [(" ", FAINT)] * (end - columns)
     for column, _ in ticks:
         cells[column] = ("┬", FAINT) if column <= reached else ("╷", LINE)
-    covered = {
-        cell for name in names.values() for cell in range(name.column, name.column + len(name.text))
-    }
-    times = clock_times(page, {*page.marks, *covered} if rows == 1 else set())
+    times = clock_times(page, page.marks.keys() if rows == 1 else set())
     if rows == 1:
         cells = [
             (times[column], FAINT) if times[column] != " " else cell

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.profile.profile import is_verified
+from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.settings.editor import Editor
@@ -23,6 +24,12 @@ NAME_CELLS, NAME_ROOM = 46, 30
 WIDTHS = ((150, 14, 9, 30), (90, 11, 8, 21), (0, 9, 0, 0))
 """From a width of the list on: cells of a value, of the manual's number, and of the limits."""
 ADDRESS = 15
+UNNAMED = "unknown (99)"
+"""A value without a name in a list that has names, at its usual length."""
+TEXT_MOST = 28
+"""Cells of a value at most, in a list with long names of values."""
+LEAST_NAME, LEAST_STAGED_NAME = 31, 22
+"""Cells of the names that long values leave them; fewer next to staged values."""
 STAGED_MARK = 3
 """Cells of the arrow before a staged value."""
 
@@ -74,6 +81,8 @@ class Filled(NamedTuple):
     range: bool
     name: int
     """Cells of the longest name, with a space."""
+    value: int = 0
+    """Cells of the longest value in the list, or of the longest name of one."""
 
 
 class TableLayout(NamedTuple):
@@ -89,24 +98,44 @@ def layout_of(editor: Editor, items: Sequence[TableLine], width: int) -> TableLa
     parameters = [profile[item.code] for item in items if item.code]
     results = editor.staging.results
     names = tuple(parameter.name for parameter in parameters)
+    now = max((_longest_now(editor, p.code) for p in parameters), default=0)
+    longest = max((longest_value(profile, p.code) for p in parameters), default=0)
     filled = Filled(
         any(p.code in editor.staging.edits or p.code in results for p in parameters),
         any(other_text(editor, p) for p in parameters),
         any(range_text(editor, p) for p in parameters),
         max(map(len, names), default=0) + 1,
+        min(TEXT_MOST, max(now, longest)),
     )
     columns = fitting_columns(width, filled)
-    if filled.staged and not editor.other and columns.name < filled.name:
+    is_cut = columns.value < now or (filled.staged and columns.name < filled.name)
+    if is_cut and not editor.other:
         # the details have the factory value
         columns = fitting_columns(width, filled._replace(other=False))
     return TableLayout(columns, fitted_names(names, columns.name - 1))
+
+
+@lru_cache(maxsize=4096)
+def longest_value(profile: Profile, code: str) -> int:
+    """Return the length of the longest name of a parameter's values; 0 if it is a number."""
+    names = profile.names(profile[code])
+    return max(map(len, (UNNAMED, *names.values()))) if names else 0
+
+
+def _longest_now(editor: Editor, code: str) -> int:
+    """Return the length of the held value or the staged one, whichever is longer."""
+    edit = editor.staging.edits.get(code)
+    held = held_drawn(
+        editor, code, current=len, old=lambda value, _: len(value), missing=len(NOT_AVAILABLE)
+    )
+    return max(held, len(edit.text) if edit is not None else 0)
 
 
 def fitting_columns(width: int, filled: Filled) -> Columns:
     """Return the columns that fit a list of that width.
 
     Limits are omitted if names would have less than `NAME_ROOM` cells, number and address if one
-    would be shortened: the details have them.
+    would be shortened: the details have them. Cells that no name needs go to the values.
     """
     value, number, limits = next(row for least, *row in WIDTHS if width >= least)
     columns = Columns(
@@ -115,15 +144,31 @@ def fitting_columns(width: int, filled: Filled) -> Columns:
         staged=value if filled.staged else 0,
         other=value if filled.other else 0,
     )
+    longer = filled.value - value if filled.value > value else 0
+    longer *= 1 + filled.staged + filled.other
     more = (
-        ("range", limits if filled.range else 0, min(filled.name, NAME_ROOM)),
-        ("number", number, filled.name),
-        ("address", ADDRESS if number == WIDTHS[0][2] else 0, filled.name),
+        ("range", limits if filled.range else 0, min(filled.name, NAME_ROOM) + longer),
+        ("number", number, filled.name + longer),
+        ("address", ADDRESS if number == WIDTHS[0][2] else 0, filled.name + longer),
     )
     for column, cells, name in more:
         if columns.taken + cells + max(8, name) <= width:
             columns = columns._replace(**{column: cells})
+    columns = _with_longer_values(columns, width, filled)
     return columns._replace(name=max(8, min(max(NAME_CELLS, filled.name), width - columns.taken)))
+
+
+def _with_longer_values(columns: Columns, width: int, filled: Filled) -> Columns:
+    """Return the columns with values as long as the list has them, if its names leave the room."""
+    shared = 1 + filled.staged + filled.other
+    least = LEAST_STAGED_NAME if filled.staged else LEAST_NAME
+    spare = (width - columns.taken - min(filled.name, least)) // shared
+    value = max(columns.value, min(filled.value, columns.value + spare))
+    return columns._replace(
+        value=value,
+        staged=value if filled.staged else 0,
+        other=value if filled.other else 0,
+    )
 
 
 def items_of(editor: Editor, codes: Sequence[str], *, headings: bool) -> list[TableLine]:

@@ -132,6 +132,7 @@ def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
     if width > STEPS_WIDTH:
         # a name is not cut while there is room for it beside the results
         room = max(room, *(min(len(plain(step.step)), STEP_ROOM) for step in steps))
+    names = fitted_names(tuple(plain(step.step) for step in steps), room)
     lines = []
     for number, step in enumerate(steps[top : top + rows], start=top + 1):
         state = _state(view, step)
@@ -139,7 +140,7 @@ def _steps(view: StartUpView, width: int, rows: int) -> list[Text]:
         here = number == at + 1
         text = Text(no_wrap=True).append(" ▸" if here else "  ", ATTENTION)
         text.append(sign, style)
-        name = f" {cut(plain(step.step), room)}" if width > STEP_NUMBERS_WIDTH else ""
+        name = f" {names[plain(step.step)]:<{room}}" if width > STEP_NUMBERS_WIDTH else ""
         text.append(f" {number:>2}{name}", STRONG if here else PLAIN)
         if width > STEPS_WIDTH:
             text.append(f" {cut(_result(view, step), width - 8 - room)}", FAINT)

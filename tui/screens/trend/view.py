@@ -332,5 +332,5 @@ def _marks_line(view: TrendView) -> Text:
     if view.selected == len(view.bands):
         return Text("  New band: press Enter to choose its parameter.", KEY)
     if not text:
-        return Text("  Left opens the cursor. M sets mark A there, or at the newest value.", FAINT)
+        return Text("  Press Left for the cursor, M for mark A.", FAINT)
     return text
