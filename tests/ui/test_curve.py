@@ -301,6 +301,10 @@ def test_name_of_a_mark_hides_no_clock_time() -> None:
             if at not in range(*time.span()):
                 assert time[0][-2:] in axis
         assert "write" in heading + axis
+        view = marked_at(bare, {1000.0 - before: "write", 1000.0 - 2: "start"})
+        heading, *_, axis = (line.plain for line in curve_lines(view, room))
+        assert "write" in heading + axis
+        assert "start" in heading + axis
 
 
 @pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])

@@ -206,14 +206,17 @@ def _heading(view: View, band: Band, marks: Collection[TrendMark], width: int) -
     unit = band.parameter.unit or "raw"
     right = Text.assemble(("<", KEY), (f" {span_text(view.step.span)} ", FAINT), (">", KEY))
     right.append("  =", KEY).append(" read ", FAINT)
+    shown = sorted(marks, key=TREND_MARKS.index)
+    signs = sum(len(MARK_SIGNS[mark][2]) + 4 for mark in shown)
     left = Text(f" {short(unit, LABEL_CELLS - 1):<{LABEL_CELLS - 1}} ", FAINT, no_wrap=True)
     left.append_text(_sample("⠒⠒", STRONG, view)).append(f" {NAMES[band.quantity]}", FAINT)
     if band.quantity == "output_frequency" and _has_reference(view):
         left.append("  ").append_text(_sample("⠂⠂", REFERENCE_STYLE, view))
-        left.append(" reference", FAINT)
-    for mark in sorted(marks, key=TREND_MARKS.index):
+        is_tight = left.cell_len + len(" reference") + signs + right.cell_len > width
+        left.append(" ref" if is_tight else " reference", FAINT)
+    for mark in shown:
         sign, style, name = MARK_SIGNS[mark]
-        if left.cell_len + len(name) + 4 + right.cell_len >= width:
+        if left.cell_len + len(name) + 4 + right.cell_len > width:
             break
         left.append("  ").append(sign, style).append(f" {name}", FAINT)
     left.append(" " * max(1, width - left.cell_len - right.cell_len))
