@@ -44,10 +44,10 @@ def profile_text(drive: FoundDrive) -> str:
 
 def drive_names(fleet: Fleet) -> list[str]:
     """Return the name or else the model of each drive, as the list shows it."""
-    return [drive.identity.name or model_text(drive) for drive in fleet.found.values()]
+    return [drive.identity.name or shown_model(drive) for drive in fleet.found.values()]
 
 
-def model_text(drive: FoundDrive) -> str:
+def shown_model(drive: FoundDrive) -> str:
     """Return the reference of a drive, else its family."""
     return drive.identity.reference or profile_text(drive) or "unknown drive"
 
@@ -200,7 +200,7 @@ def _row(
     drive: FoundDrive, fleet: Fleet, look: Look | None, at: tuple[float, float], connected: bool
 ) -> WallRow:
     identity, console = drive.identity, drive.console
-    model = model_text(drive)
+    model = shown_model(drive)
     if console is None:
         return WallRow(identity.device, identity.name, model, words="no profile")
     seen = _seen(console, look, *at)

@@ -24,7 +24,7 @@ NAME_CELLS, NAME_ROOM = 46, 30
 WIDTHS = ((150, 14, 9, 30), (90, 11, 8, 21), (0, 9, 0, 0))
 """From a width of the list on: cells of a value, of the manual's number, and of the limits."""
 ADDRESS = 15
-UNNAMED = "unknown (99)"
+UNNAMED_VALUE = "unknown (99)"
 """A value without a name in a list that has names, at its usual length."""
 TEXT_MOST = 28
 """Cells of a value at most, in a list with long names of values."""
@@ -119,7 +119,7 @@ def layout_of(editor: Editor, items: Sequence[TableLine], width: int) -> TableLa
 def longest_value(profile: Profile, code: str) -> int:
     """Return the length of the longest name of a parameter's values; 0 if it is a number."""
     names = profile.names(profile[code])
-    return max(map(len, (UNNAMED, *names.values()))) if names else 0
+    return max(map(len, (UNNAMED_VALUE, *names.values()))) if names else 0
 
 
 def _longest_now(editor: Editor, code: str) -> int:
