@@ -27,7 +27,7 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from tui.bus.ended_exchange import EndedExchange
+from tui.bus.model import EndedExchange
 from tui.session.record.reader import RecordReader
 from tui.session.record.record_file import RecordFile
 from tui.session.record.recorder import RECORD_BACKLOG, LineRecorder

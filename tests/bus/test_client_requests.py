@@ -21,6 +21,7 @@ from tui.bus.line_events import (
     ControlDenied,
     ControlRequested,
     DevicesStopped,
+    DeviceWritten,
     LineEvent,
     NoticeReceived,
 )
@@ -50,7 +51,6 @@ from tui.bus.share.messages import (
 from tui.bus.share.owner_watch import WATCH_INTERVAL
 from tui.bus.share.requested import OWNER_ENDED, PendingRequests
 from tui.bus.shared_state import SharedState
-from tui.bus.written import DeviceWritten
 
 from .conftest import WIDE
 

@@ -9,7 +9,6 @@ from typing import Any, cast
 import pytest
 
 from tests.line_events import on_event
-from tui.bus.ended_exchange import EndedExchange
 from tui.bus.errors import (
     OUTCOME_UNKNOWN,
     ChecksumFault,
@@ -19,8 +18,9 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.bus.limits import CAUTIOUS, STANDARD_EXCEPTIONS
+from tui.bus.line_events import DeviceWritten
 from tui.bus.master import ExchangeResult, Piece, ResultKind
-from tui.bus.model import Priority, Reply, Timing
+from tui.bus.model import EndedExchange, Priority, Reply, Timing
 from tui.bus.requests import Read, Request, WriteOne
 from tui.bus.schedule import outcomes as outcomes_module
 from tui.bus.schedule.outcomes import Next, Outcomes
@@ -28,7 +28,6 @@ from tui.bus.schedule.patience import Devices
 from tui.bus.schedule.queue import Job
 from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
-from tui.bus.written import DeviceWritten
 from tui.wire.frames import frame
 
 from .conftest import WIDE

@@ -15,9 +15,8 @@ import pytest
 from tests.line_events import on_event
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import DeviceException, LineBusy, NoAnswer, RequestRefused
-from tui.bus.line_events import ControlAnswered, ControlDenied, ControlRequested
+from tui.bus.line_events import ControlAnswered, ControlDenied, ControlRequested, DeviceWritten
 from tui.bus.share.place import SharePlace
-from tui.bus.written import DeviceWritten
 from tui.wire.frames import frame
 
 from .conftest import Share

@@ -19,7 +19,7 @@ from tui.bus.api import Priority
 from tui.bus.bounds import MOST_STOPPERS, STOPS_WRAP
 from tui.bus.limits import CAUTIOUS, Limits, Window
 from tui.bus.line import Line
-from tui.bus.line_events import DevicesStopped, NoticeReceived
+from tui.bus.line_events import DevicesStopped, DeviceWritten, NoticeReceived
 from tui.bus.model import DeviceCounters, DeviceState, LineCounters, LineState, LineStatus
 from tui.bus.poll_plan import PlannedRead, PollPlan
 from tui.bus.program import Program
@@ -54,7 +54,6 @@ from tui.bus.share.place import Owner
 from tui.bus.shared_state import SharedState
 from tui.bus.stop_counts import StopCounts, is_newer
 from tui.bus.trace import Frame
-from tui.bus.written import DeviceWritten
 
 from .conftest import Share
 from .peer import PtyPeer, eventually, honest

@@ -9,8 +9,8 @@ import pytest
 
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.drive.profile import library
+from tui.session.clock import patience
 from tui.session.fleet import Fleet
-from tui.session.patience import patience
 from tui.session.running.watching import learned_timeout
 from tui.session.timeout_report import TimeoutWatch
 

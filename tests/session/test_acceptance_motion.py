@@ -14,8 +14,7 @@ from tui.bus.line_events import ControlRequested, DevicesStopped, ProgramsChange
 from tui.drive.profile import library
 from tui.session.acceptance import motion
 from tui.session.acceptance.motion import AcceptanceEnded, Motion, MotionBench, StepFailed
-from tui.session.running.ending import Ending
-from tui.session.running.errors import MotorStopped, MotorTripped, NotStopped
+from tui.session.running.ending import Ending, MotorStopped, MotorTripped, NotStopped
 
 FORWARD = Motion("forward", 20.0, 5.0)
 

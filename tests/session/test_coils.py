@@ -10,13 +10,13 @@ from pathlib import Path
 import pytest
 
 from tui.bus.coils import ReadCoils, ReadDiscrete, WriteCoil, WriteCoils
-from tui.bus.ended_exchange import EndedExchange
 from tui.bus.errors import RequestRefused
 from tui.bus.fake import FakeLine
+from tui.bus.line_events import DeviceWritten
 from tui.bus.link import SerialLink
+from tui.bus.model import EndedExchange
 from tui.bus.program import Program
 from tui.bus.requests import WriteOne
-from tui.bus.written import DeviceWritten
 from tui.drive.errors import ValueRefused
 from tui.drive.first_stop import blind_stops
 from tui.drive.foreign_write import WordKind, classify_words

@@ -15,7 +15,7 @@ from tests.sweeps import kept
 from tests.ui import fakes
 from tui.bus.fake import FakeLine
 from tui.bus.line import Timing
-from tui.bus.written import DeviceWritten
+from tui.bus.line_events import DeviceWritten
 from tui.drive.errors import ValueRefused
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import dump_set

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.bus.ended_exchange import EndedExchange
+from tui.bus.model import EndedExchange
 from tui.drive.profile import library
 from tui.session.record.decoding import HistoryPoint
 from tui.session.record.export_rows import export_rows, from_trigger

@@ -12,8 +12,7 @@ import pytest
 from tui.bus.errors import LineError, NoAnswer
 from tui.session.command.stop_report import Phase, StopReport, StopSummary
 from tui.session.running import motor_run, watching
-from tui.session.running.ending import Ending
-from tui.session.running.errors import MotorStopped, MotorTripped, NotStopped
+from tui.session.running.ending import Ending, MotorStopped, MotorTripped, NotStopped
 from tui.session.running.motor_run import MotorRun
 
 POLL = 0.05

@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 
 from tests.programs import wait_until
 from tests.sources import ROOT
-from tui.bus.ended_exchange import EndedExchange
+from tui.bus.model import EndedExchange
 from tui.session.record import record_file, recorder
 from tui.session.record.reader import RecordedWord, RecordReader
 from tui.session.record.record_file import RecordFile

@@ -30,8 +30,7 @@ from tui.session.startup.judging import (
     changed_codes,
     field_fault,
 )
-from tui.session.startup.lines import start_up_lines
-from tui.session.startup.progress import progress_file, read_progress
+from tui.session.startup.progress import progress_file, read_progress, start_up_lines
 from tui.session.startup.start_up import DEFICIENCY_STAYS, StartUp, begin_again, open_start_up
 from tui.session.startup.steps import GuideField
 

@@ -12,8 +12,8 @@ import msgspec
 import pytest
 
 from tests.ui import fakes
+from tui.bus.line_events import DeviceWritten
 from tui.bus.program import Program
-from tui.bus.written import DeviceWritten
 from tui.drive.profile import library
 from tui.session.monitor import trend as trends
 from tui.session.monitor.snapshot import Snapshot

@@ -12,7 +12,6 @@ from typing import Any
 
 import msgspec
 
-from tui.bus.ended_exchange import EndedExchange
 from tui.bus.errors import DeviceException, ExchangeError, NoAnswer, RequestRefused
 from tui.bus.expectation import IDENTIFY
 from tui.bus.fake import FakeLine
@@ -21,6 +20,7 @@ from tui.bus.limits import CAUTIOUS, STANDARD_EXCEPTIONS
 from tui.bus.line_events import StateChanged
 from tui.bus.link import SerialLink
 from tui.bus.model import (
+    EndedExchange,
     IdentificationObjects,
     LineCounters,
     LineState,

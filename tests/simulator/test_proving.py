@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from tui.cli.main import main
+from tui.cli.running.profile_proof import untested
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import ProfileData
@@ -19,7 +20,6 @@ from tui.simulator.charts.own import OwnChart
 from tui.simulator.proving.drive_steps import drive_steps
 from tui.simulator.proving.proof_bench import ProofBench
 from tui.simulator.proving.proof_steps import command_steps, prove_profile
-from tui.simulator.proving.untested import untested
 from tui.simulator.registers import Registers
 
 from .exchange import Exchange

@@ -5,13 +5,14 @@ from __future__ import annotations
 import logging
 import threading
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import msgspec
+from msgspec import Meta
 from msgspec.structs import force_setattr
 
+from .bounds import DeviceId, MonotonicTime, RegisterValue, WrittenPlace
 from .program import Program, readable
-from .written import DeviceWritten
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
@@ -19,6 +20,27 @@ if TYPE_CHECKING:
     from .model import LineState, Reply
     from .notes import LineNote
     from .requests import Request
+
+
+MOST_WRITTEN = 125
+"""Registers of one write."""
+
+
+class DeviceWritten(msgspec.Struct, frozen=True, tag=True):
+    """Registers that a device has acknowledged; device 0 is a broadcast, which none does."""
+
+    device: DeviceId
+    address: WrittenPlace
+    values: Annotated[tuple[RegisterValue, ...], Meta(max_length=MOST_WRITTEN)]
+    program: Program
+    time: MonotonicTime
+    """When the last byte of the reply came."""
+
+    @property
+    def words(self) -> dict[int, int]:
+        """The written words by place; a coil is a word of 0 or 1."""
+        return dict(enumerate(self.values, self.address))
+
 
 log = logging.getLogger(__name__)
 

@@ -13,7 +13,6 @@ from pathlib import Path
 from types import MappingProxyType
 
 from .bounds import MOST_NOTICE, MOST_TEXT
-from .ended_exchange import EndedExchange
 from .errors import stopped_first_text
 from .keep_alive import KeepAlives
 from .leases import WriteLeases
@@ -26,6 +25,7 @@ from .line_events import (
     ProgramLost,
     ProgramsChanged,
 )
+from .model import EndedExchange
 from .notes import Notes
 from .program import KEEPER, Program
 from .share.beside import send_plain_stop

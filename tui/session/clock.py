@@ -1,10 +1,14 @@
-"""Clock of a session, which a test can replace."""
+"""Clock of a session, which a test can replace, and waiting times on a slow line."""
 
 from __future__ import annotations
 
 import asyncio
 import time
 from datetime import datetime
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tui.bus.api import ModbusLine
 
 SET_BY = 0.1
 """Least shift in seconds between both clocks that counts as a change of the computer's time."""
@@ -51,3 +55,13 @@ class Clock:
 
 
 REAL_CLOCK = Clock()
+
+SLOW_CHARACTERS = 1200
+"""Characters that others may say meanwhile: at 1200 baud 11 s, at 19200 0.7 s."""
+
+
+def patience(line: ModbusLine, seconds: float) -> float:
+    """So many seconds, and longer on a slow line: what takes ten exchanges takes seconds there."""
+    from tui.bus.link import character_time
+
+    return seconds + SLOW_CHARACTERS * character_time(line.link)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
+import logging
 import math
 import weakref
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from threading import Lock
 from typing import Annotated
 
@@ -17,9 +18,12 @@ from tui.bus.bounds import MOST_CARE
 from tui.bus.line_events import ControlDenied, DevicesStopped, LineEvent
 from tui.bus.link import label
 from tui.bus.notes import LineNote
+from tui.bus.prepared import PreparedWrite, prepared_write
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
+from tui.drive.first_stop import blind_stops
 from tui.drive.profile.profile import Profile, digest_of, proof_text
 from tui.drive.profile.schema import Parameter
+from tui.drive.profile.stop_profile import stop_profile_of
 from tui.drive.site_proof import is_proved_write, unproved_commands
 
 from .arming import Arming
@@ -28,7 +32,6 @@ from .clock import REAL_CLOCK, Clock
 from .connect.contradiction import contradiction
 from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
-from .connect.prepared_stop import prepared_stop
 from .event_notes import PROFILE_OF_DRIVE
 from .image import RegisterImage
 from .reading import Reading
@@ -323,3 +326,24 @@ def why_unproved(session: DriveSession, parameter: Parameter, raw: int) -> str:
     if not session.is_unconfirmed or is_proved_write(session.profile, parameter, raw):
         return ""
     return UNPROVED_WRITE.format(code=parameter.code, name=session.profile.name)
+
+
+log = logging.getLogger(__name__)
+
+
+def prepared_stop(
+    line: ModbusLine, device: int, families: Sequence[Profile]
+) -> tuple[PreparedWrite, ...]:
+    """Prepare the words that stop a drive of any of these families in any of their charts.
+
+    Empty if there is no such word; an error must not keep a drive from being opened.
+    """
+    try:
+        words = blind_stops([stop_profile_of(family) for family in families])
+        limits = limits_of(families[0])
+        return tuple(
+            prepared_write(line.link, limits, device, word.address, word.values) for word in words
+        )
+    except Exception:
+        log.exception("no stop is prepared for device %s", device)
+        return ()

@@ -24,10 +24,9 @@ from .clock import REAL_CLOCK, Clock
 from .command.access import HalfSent
 from .command.stop import Stopper
 from .connect.identify import DriveIdentity
-from .connect.prepared_stop import prepared_stop
 from .connect.search import Search
 from .console import DriveConsole
-from .drive import DriveSession
+from .drive import DriveSession, prepared_stop
 from .event_notes import EventNotes
 from .events import EventLog
 from .journal import FAULT_WHYS, Entry, Journal, entry_time

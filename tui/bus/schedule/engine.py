@@ -12,12 +12,11 @@ from typing import TypeVar
 
 from tui.wire.frames import pdu_of
 
-from ..ended_exchange import EndedExchange
 from ..errors import HOPELESS, LineBehind, LineClosed, LineError, LineLost
 from ..line_events import StateChanged
 from ..link import Link, SerialLink, TcpLink, label
 from ..master import LineContext, MonotonicClock
-from ..model import LineState, LineStatus, Timing
+from ..model import EndedExchange, LineState, LineStatus, Timing
 from ..prepared import PreparedWrite
 from ..program_use import ProgramUse
 from ..shared_state import SharedState

@@ -10,7 +10,6 @@ from time import time
 from tui.safety import MISSES
 from tui.wire.overheard import overheard_request
 
-from ..ended_exchange import EndedExchange
 from ..errors import (
     OUTCOME_UNKNOWN,
     ChecksumFault,
@@ -21,12 +20,12 @@ from ..errors import (
     request_text,
 )
 from ..limits import STANDARD_EXCEPTIONS
+from ..line_events import DeviceWritten
 from ..master import ExchangeResult, MonotonicClock, Piece, ResultKind
-from ..model import Priority, Reply, Timing
+from ..model import EndedExchange, Priority, Reply, Timing
 from ..requests import BROADCAST
 from ..shared_state import SharedState
 from ..tally import Tally
-from ..written import DeviceWritten
 from .device_record import known_before
 from .patience import Devices
 from .queue import Job

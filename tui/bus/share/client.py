@@ -15,6 +15,7 @@ from ..line_events import (
     ControlDenied,
     ControlRequested,
     DevicesStopped,
+    DeviceWritten,
     LineEvent,
     NoteReceived,
     NoticeReceived,
@@ -24,7 +25,6 @@ from ..model import LineState, LineStatus
 from ..notes import NOTES_A_LOOK, LineNote
 from ..schedule.inside import LineInside, Say
 from ..shared_state import LinePublisher, SharedState, commanded_by
-from ..written import DeviceWritten
 from .carried import Polled, error_from
 from .heartbeat import Heartbeat
 from .messages import (

@@ -34,11 +34,11 @@ from ..bounds import (
 )
 from ..keep_alive import KeepAlive
 from ..limits import Limits
+from ..line_events import DeviceWritten
 from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priority
 from ..notes import LineNote
 from ..program import Program
 from ..trace import Frame
-from ..written import DeviceWritten
 from .carried import ErrorForm, Polled, Subscribe, Unsubscribe
 
 VERSION = 11

@@ -8,7 +8,14 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ..limits import CAUTIOUS
-from ..line_events import DevicesStopped, LineEvent, NoteReceived, NoticeReceived, StopDue
+from ..line_events import (
+    DevicesStopped,
+    DeviceWritten,
+    LineEvent,
+    NoteReceived,
+    NoticeReceived,
+    StopDue,
+)
 from ..link import label
 from ..notes import LineNote
 from ..program import Program
@@ -16,7 +23,6 @@ from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
 from ..schedule.queue import Job
 from ..shared_state import LinePublisher
-from ..written import DeviceWritten
 from .attached import Client
 from .carried import Subscribe, Unsubscribe
 from .commanding import Commanding

@@ -21,12 +21,11 @@ from ..shared.csv_files import CsvFile
 from ..shared.errors import USAGE, Failure, file_failures
 from ..shared.line_argument import LineArgument
 from ..shared.options import devices_option, json_option
-from ..shared.output import print_json
+from ..shared.output import both_times, print_json, time_typed
 from ..shared.registration import command
 from ..shared.rows import Column
 from ..shared.say import say
 from ..shared.standard_streams import NO_RECORD_FROM_INPUT, STANDARD
-from ..shared.times import both_times, time_typed
 
 if TYPE_CHECKING:
     from tui.session.capture_file import CaptureFile

@@ -11,11 +11,10 @@ import click
 
 from ..shared.errors import USAGE, Failure
 from ..shared.options import json_option
-from ..shared.output import print_json
+from ..shared.output import both_times, print_json, time_typed
 from ..shared.registration import command
 from ..shared.rows import Column
 from ..shared.say import say
-from ..shared.times import both_times, time_typed
 
 if TYPE_CHECKING:
     from tui.session.changes import Change, ChangeList

@@ -129,7 +129,7 @@ def report(
     from tui.session.journal_reading import entries_of
     from tui.session.report import report_text as text_of
     from tui.session.report_trends import TREND_KINDS, report_trends, trend_file
-    from tui.session.startup.lines import start_up_lines
+    from tui.session.startup.progress import start_up_lines
 
     from ..documents.setting_documents import ReportDocument
 

@@ -12,7 +12,7 @@ import click
 from tui.bus.errors import LineError
 from tui.drive.fault_reset import not_in_command, reset_codes, reset_follows
 from tui.drive.sentences import MAY_START
-from tui.session.patience import patience
+from tui.session.clock import patience
 from tui.session.running.watching import COMMAND_POLL_INTERVAL, latest_of
 
 from ..running.stop_following import carried_to_rest

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from tui.drive.profile.profile import Profile
 from tui.drive.sentences import counted
 
 from ..documents.other_documents import CheckDocument, ProofDocument, ProofStepField
@@ -128,7 +129,6 @@ def _proved(path: Path) -> ProofDocument:
     """Return the result of a file; without steps if it has faults."""
     from tui.drive.profile import library
     from tui.simulator.proving.proof_steps import prove_profile
-    from tui.simulator.proving.untested import untested
 
     if faults := library.all_faults_of(path):
         return ProofDocument(file=str(path), passed=False, faults=faults, steps=[], not_tested=[])
@@ -149,3 +149,31 @@ def _field(step: ProofStep, path: Path) -> ProofStepField:
         return ProofStepField(name=step.title, passed=True, file=None, line=None, fault=None)
     file, line = read_tables(path, library.packaged_folder()).place(step.path)
     return ProofStepField(name=step.title, passed=False, file=file, line=line, fault=step.fault)
+
+
+def untested(profile: Profile, steps: Sequence[ProofStep]) -> list[str]:
+    """Return a sentence for each important subject that no step tested, with what the file
+    lacks."""
+    data = profile.data
+    places = {step.path[0] for step in steps}
+    orders = {order.id for chart in data.charts for order in chart.orders}
+    titles = [step.title for step in steps]
+    tested = {
+        "Commands and stops: there are no [[charts]] with orders.": "charts" in places,
+        "Reverse: there is no order reverse.": "reverse" in orders or "forward" not in orders,
+        "References: there are no [[references]] with a unit, or no order forward.": any(
+            title.endswith(" agree") for title in titles
+        ),
+        "The output frequency: no parameter has the quantity output_frequency.": bool(
+            profile.quantity("output_frequency")
+        ),
+        "Fault numbers: there are no codes in [faults].": bool(data.faults.codes),
+        "Communication loss: there is no [communication_fault] with a timeout and a chart.": (
+            "communication_fault" in places
+        ),
+        "Saving: there is no [memory.save], or no setting that waits for it.": any(
+            title.startswith("settings are saved") for title in titles
+        ),
+        "Addresses and word order: there are no [[frames]] of the manual.": "frames" in places,
+    }
+    return [text for text, is_tested in tested.items() if not is_tested]

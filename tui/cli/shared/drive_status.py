@@ -16,7 +16,7 @@ from tui.drive.hints import alarm_words
 from tui.drive.orders import chart_in_force, deciding_codes, interlock_codes
 from tui.drive.sentences import sentence
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.patience import patience
+from tui.session.clock import patience
 from tui.session.reading import Reading, with_text
 
 from .control import control_field, control_row

@@ -117,7 +117,7 @@ def status_of(error: Exception) -> int | None:
     )
     from tui.session.blocks.write import AssignmentRefused
     from tui.session.command.access import NotFollowed
-    from tui.session.running.errors import MotorStopped, MotorTripped, NotStopped
+    from tui.session.running.ending import MotorStopped, MotorTripped, NotStopped
     from tui.session.settings.write import NotTaken
     from tui.simulator.errors import SimulatorError
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tui.drive.sentences import sentence
-from tui.session.patience import patience
+from tui.session.clock import patience
 
 from .say import say
 

@@ -144,7 +144,7 @@ class SetKeys(ParameterKeys):
         from tui.session.report import report_text
         from tui.session.report_page import PAGE_SUFFIXES, page_text
         from tui.session.report_trends import linked, report_trend_lines, report_trends, trend_files
-        from tui.session.startup.lines import start_up_lines
+        from tui.session.startup.progress import start_up_lines
 
         session, profile = self.session, self.session.profile
         device, line = session.device, self.app.line_text

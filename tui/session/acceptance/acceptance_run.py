@@ -18,8 +18,7 @@ from tui.drive.settings.parameter_set import ParameterSet
 from ..console import DriveConsole
 from ..fleet import Fleet
 from ..read.upload import Upload, setting_codes
-from ..running.ending import Ending
-from ..running.errors import MotorStopped, MotorTripped, NotStopped
+from ..running.ending import Ending, MotorStopped, MotorTripped, NotStopped
 from .carry_out import carry_out_step
 from .motion import TEST_PERIOD, AcceptanceEnded, MotionBench
 from .plan import HighSpeed, read_high_speed

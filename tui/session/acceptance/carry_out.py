@@ -21,7 +21,7 @@ from ..command.reference import convert_reference, reference_codes
 from ..monitor.snapshot import Snapshot
 from ..proof.prover import NothingToProve, Prover
 from ..proof.result import ProofResult, proof_entry
-from ..running.errors import MotorStopped
+from ..running.ending import MotorStopped
 from ..running.watching import latest_of, outcome_or_error
 from ..settings.write import NotTaken
 from ..work import Permit, Task

@@ -22,8 +22,7 @@ from ..command.stop_report import Phase
 from ..console import DriveConsole
 from ..fleet import Fleet
 from ..monitor.snapshot import Snapshot
-from ..running.ending import Ending
-from ..running.errors import MotorStopped, MotorTripped, NotStopped
+from ..running.ending import Ending, MotorStopped, MotorTripped, NotStopped
 from ..running.motor_run import MotorRun, RunEvent
 from ..running.watching import latest_of, outcome_or_error
 from ..work import Permit

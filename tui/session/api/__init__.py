@@ -7,7 +7,7 @@ line, DriveError by the drive, its profile, or a check of this package.
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
-from ..running.errors import MotorStopped, MotorTripped, NotStopped
+from ..running.ending import MotorStopped, MotorTripped, NotStopped
 from ..settings.typed import WouldRound
 from .drive import AsyncDrive, Drive
 from .line import AsyncDriveLine, DriveLine, open_drives, open_drives_async

@@ -23,7 +23,7 @@ from ..monitor.monitor import Monitor
 from ..monitor.snapshot import Snapshot, as_read
 from ..read.reader import Reader
 from ..reading import reading_of
-from ..running.errors import NotStopped
+from ..running.ending import NotStopped
 from ..settings.apply import apply_edits
 from ..settings.eeprom import save_to_eeprom
 from ..settings.typed import stage_typed

@@ -17,8 +17,7 @@ from ..command.stop_report import not_stopped
 from ..console import DriveConsole
 from ..fleet import Fleet
 from ..monitor.snapshot import Snapshot
-from ..running.ending import Ending
-from ..running.errors import NotStopped
+from ..running.ending import Ending, NotStopped
 from ..running.motor_run import MotorRun, RunEvent
 from ..running.watching import WATCH_PERIOD, first_cycle, outcome_or_error
 from ..work import Permit

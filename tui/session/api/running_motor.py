@@ -13,7 +13,7 @@ from typing import Any, Self
 
 from tui.drive.chart import Direction
 
-from ..running.errors import NotStopped
+from ..running.ending import NotStopped
 from ..signals import BY_SIGNAL, handled, signal_name
 from .drive_calls import DriveCalls
 from .guarded_run import GuardedRun

@@ -10,12 +10,11 @@ from typing import Literal, NamedTuple, Protocol, get_args
 
 import msgspec
 
-from tui.bus.line_events import LineEvent, NoteReceived
+from tui.bus.line_events import DeviceWritten, LineEvent, NoteReceived
 from tui.bus.notes import LONGEST_KIND, LineNote
 from tui.bus.program import readable
 from tui.bus.requests import BROADCAST
 from tui.bus.shared_state import SharedState
-from tui.bus.written import DeviceWritten
 from tui.drive.foreign_write import WordKind, classify_words
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity

@@ -14,7 +14,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tui.bus.ended_exchange import EndedExchange
+from tui.bus.model import EndedExchange
 from tui.drive.sentences import counted
 
 from .clock_jumps import ClockJumps

@@ -9,7 +9,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import NamedTuple
 
-from tui.bus.ended_exchange import EndedExchange
+from tui.bus.model import EndedExchange
 from tui.wire.frames import BIT_READS, bits_of, packed_bits
 
 RECORD_VERSION = 1

@@ -1,4 +1,7 @@
-"""End of a command that would continue: by a signal, after a time, or when its reader closes."""
+"""End of a command that would continue, and errors of a run that ended early.
+
+A signal ends it, a time, or a reader that closes.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,21 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
 
+from tui.drive.errors import DriveError
+
 from ..signals import handled, signal_name
+
+
+class MotorStopped(DriveError):
+    """A motor was stopped, but not by the end of its run; it is not started again."""
+
+
+class MotorTripped(MotorStopped):
+    """A motor was stopped by a fault of its drive."""
+
+
+class NotStopped(DriveError):
+    """A motor could not be stopped by this program: stop it at the machine."""
 
 
 @dataclass(slots=True)

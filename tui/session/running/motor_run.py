@@ -20,8 +20,7 @@ from ..monitor.snapshot import Snapshot
 from ..monitor.timeout import polling_stop_text
 from ..reading import with_text
 from ..timeout_report import TimeoutWatch
-from .ending import Ending
-from .errors import MotorStopped, MotorTripped, NotStopped
+from .ending import Ending, MotorStopped, MotorTripped, NotStopped
 from .watching import latest_of, learned_timeout
 
 RUN_POLL_INTERVAL = 0.05

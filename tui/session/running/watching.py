@@ -10,7 +10,7 @@ from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
-from ..patience import patience
+from ..clock import patience
 from ..work import Outcome, OutcomeKind
 
 if TYPE_CHECKING:
