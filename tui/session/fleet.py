@@ -275,13 +275,13 @@ class Fleet:
         """Stop drives; for any thread. Raises LineClosed."""
         self.stopper.stop(sessions, order, by)
 
-    def stop_others(self, by: str = "the stop key") -> tuple[int, ...]:
+    def stop_others(self) -> tuple[int, ...]:
         """Stop the drives that other programs on the line command, except those in this fleet.
 
         Return their addresses. For any thread; returns at once.
         """
         own = {session.device for session in self.sessions}
-        return request_stops_of_others(self.line, own, by, self.events.add)
+        return request_stops_of_others(self.line, own, "the stop key", self.events.add)
 
     def last_stop(self, error: Exception, only: DriveConsole | None = None) -> None:
         """Stop every drive, or only one, by its prepared frames after an internal error.

@@ -128,9 +128,9 @@ class RegisterImage:
         with self._lock:
             self._waiting_for[code] = reported
 
-    def confirm(self, code: str, raw: int, time: float, origin: Origin = Origin.READ_BACK) -> None:
+    def confirm(self, code: str, raw: int, time: float) -> None:
         """Store one raw value that was read at a time (monotonic)."""
-        self.take({code: Reading.undecoded(self._profile[code], raw, time, origin)})
+        self.take({code: Reading.undecoded(self._profile[code], raw, time, Origin.READ_BACK)})
 
     def doubt(self, code: str) -> None:
         """Make a word unknown until it is read again, because it is being written."""

@@ -29,20 +29,21 @@ from ..shared.standard_streams import given_file
 if TYPE_CHECKING:
     from tui.simulator import Bench, BenchResult
 
+STANDARD_INPUT = 0
 BYTES_AT_ONCE = 4096
 MOST_BYTES_OF_A_LINE = 65536
 BACKGROUND_PAUSE = 1.0
 """Seconds between two tries while the terminal belongs to another program."""
 
 
-def typed_lines(handle: int = 0) -> Iterator[str]:
+def typed_lines() -> Iterator[str]:
     """Lines without their ends, until the input ends; for a thread of its own.
 
     Reads the handle itself: a buffered stream that waits would hold up the end of the program. In
     the background of a shell it waits until the program is in the foreground.
     """
     rest = b""
-    while (data := _read(handle)) != b"":
+    while (data := _read()) != b"":
         *lines, rest = (rest + data).split(b"\n")
         for line in lines:
             yield line.decode("utf-8", "replace").rstrip("\r")
@@ -50,12 +51,12 @@ def typed_lines(handle: int = 0) -> Iterator[str]:
         yield rest.decode("utf-8", "replace")
 
 
-def _read(handle: int) -> bytes:
+def _read() -> bytes:
     while True:
         try:
-            return os.read(handle, BYTES_AT_ONCE)
+            return os.read(STANDARD_INPUT, BYTES_AT_ONCE)
         except OSError:
-            if not os.isatty(handle):
+            if not os.isatty(STANDARD_INPUT):
                 return b""
             time.sleep(BACKGROUND_PAUSE)
 

@@ -67,10 +67,9 @@ def cost(
     codes: Iterable[str],
     timing: WireTiming,
     slots: Mapping[str, int],
-    unreadable: Collection[str] = (),
 ) -> Cost:
     """Return the cost of reading these with the slots in force, by the cheapest plan."""
-    plan = plan_reads(profile, codes, timing, slots, unreadable)
+    plan = plan_reads(profile, codes, timing, slots)
     return Cost(plan.microseconds, len(plan.requests) + len(plan.checks))
 
 
@@ -80,12 +79,11 @@ def saving(
     timing: WireTiming,
     before: Mapping[str, int],
     after: Mapping[str, int],
-    unreadable: Collection[str] = (),
 ) -> Saving:
     """Return the cost of reading these with the present and with the proposed slots."""
     return Saving(
-        cost(profile, codes, timing, before, unreadable),
-        cost(profile, codes, timing, after, unreadable),
+        cost(profile, codes, timing, before),
+        cost(profile, codes, timing, after),
     )
 
 
@@ -171,7 +169,6 @@ def stretches(
     profile: Profile,
     codes: Iterable[str],
     timing: WireTiming,
-    unreadable: Collection[str] = (),
 ) -> list[Stretch]:
     """Return the reads of adjacent words that save most for these parameters, best first.
 
@@ -184,7 +181,7 @@ def stretches(
         runs = (
             left[first:end] for first in range(len(left)) for end in range(first + 2, len(left) + 1)
         )
-        made = (_stretch(profile, run, timing, unreadable) for run in runs)
+        made = (_stretch(profile, run, timing) for run in runs)
         best = max((s for s in made if s and s.saves > 0), key=lambda s: s.saves, default=None)
         if best is None:
             break
@@ -197,9 +194,8 @@ def _stretch(
     profile: Profile,
     run: Sequence[Parameter],
     timing: WireTiming,
-    unreadable: Collection[str],
 ) -> Stretch | None:
-    count = run_length(profile, run, unreadable)
+    count = run_length(profile, run)
     if count is None:
         return None
     codes = tuple(p.code for p in run)

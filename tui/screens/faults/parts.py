@@ -20,10 +20,10 @@ TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practi
 """Certainty of the first cause in a word; `practice` is general practice."""
 
 
-def labelled(label: str, lines: Sequence[Text], style: Style = FAINT) -> list[Text]:
+def labelled(label: str, lines: Sequence[Text]) -> list[Text]:
     """Return the lines, indented, with a label at the left of the first."""
     return [
-        Text.assemble((f"  {label if not number else '':<{LABEL - 2}}", style)).append_text(line)
+        Text.assemble((f"  {label if not number else '':<{LABEL - 2}}", FAINT)).append_text(line)
         for number, line in enumerate(lines)
     ]
 
