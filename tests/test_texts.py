@@ -140,7 +140,6 @@ NOT_OURS = {"drawing", "printed", "title", "source", "quantity", "quantities"}
 """Keys of profiles that are not checked: drawings, quotes, documents, names that stay."""
 
 EXCEPTIONS: dict[tuple[int, str, str], str] = {
-    (2, "tells", "tui/drive/profile/json_schema.py"): "a key of profiles, on lamps",
     (9, "counted-anew", "tui/session/counters"): "a kind in the JSON of `counters`",
     (9, "mended", "tui/session"): "a kind of entry in journals, also of earlier versions",
     (18, "analogue_input_1", "tui/drive/profile/schema"): "a quantity of profiles",
@@ -150,7 +149,6 @@ EXCEPTIONS: dict[tuple[int, str, str], str] = {
     (18, "analogue", "profiles/search"): "a word that a person types",
     (18, "favourites", "tui/session/settings/editor.py"): "the key in stored files",
     (19, "asked", "tui/cli/documents"): "a JSON field of `why`, `counters` and `listen`",
-    (21, "does", "tui/drive/profile/json_schema.py"): "a key of profiles",
 }
 """By check, whole text and place: the reason why a hit stays. The texts are public."""
 

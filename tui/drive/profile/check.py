@@ -13,7 +13,6 @@ from tui.drive.sentences import sentence
 from ..errors import ProfileError
 from .address_rule import fill_addresses
 from .converting import converted
-from .form import form_faults, place_label
 from .rules import RULES, Finding, Rules
 from .rules.hints import HINT_RULES
 from .schema import ProfileData
@@ -79,6 +78,8 @@ def hints_in(path: Path, packaged: Path) -> list[ProfileFault]:
 
 def _faults_of_form(sources: ProfileTables, rules: Rules) -> list[ProfileFault]:
     """Return the faults of form, and the other faults that can still be found."""
+    from .form import form_faults, place_label
+
     form, mended = form_faults(sources.tables)
     reported = [
         (path, f"{place_label(sources.tables, path)}: {sentence(text)}")

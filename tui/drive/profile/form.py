@@ -52,6 +52,7 @@ def form_faults(
 
 def _mended(shape: shapes.Type, value: Any, path: TomlPath, faults: FormFaults) -> Any:
     """Return the value if its form is correct; else note the fault and return _ABSENT."""
+    shape = _described(shape)
     if isinstance(shape, shapes.StructType) and isinstance(value, dict):
         return _struct(shape, value, path, faults)
     if isinstance(shape, shapes.ListType) and isinstance(value, list):
@@ -160,7 +161,13 @@ def _instead(fault: str, wrong: object, choice: Any) -> str:
     return f"{text} `drivepanel profiles --schema` lists all {len(texts)} allowed values"
 
 
+def _described(shape: shapes.Type) -> shapes.Type:
+    """Return the type of a field that has a description."""
+    return shape.type if isinstance(shape, shapes.Metadata) else shape
+
+
 def _kind(shape: shapes.Type) -> str:
+    shape = _described(shape)
     match shape:
         case shapes.StructType():
             return f"a table with {', '.join(f.encode_name for f in shape.fields[:LISTED_SINGLY])}"
@@ -186,6 +193,7 @@ def allowed(field: shapes.Field) -> str:
 
 
 def _invented(shape: shapes.Type) -> Any:
+    shape = _described(shape)
     match shape:
         case shapes.StructType(fields=fields):
             return {field.encode_name: _invented(field.type) for field in fields if field.required}

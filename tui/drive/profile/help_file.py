@@ -16,7 +16,6 @@ from tui.drive.sentences import sentence
 
 from ..errors import ProfileError
 from .converting import converted
-from .form import form_faults, place_label
 from .schema import AlarmHelp, CauseRule, FaultHelp, HelpData, Hint, Parameter, ProfileData
 from .shared_rows import SourceText, parsed, source_text
 from .toml_lines import TomlPath
@@ -152,6 +151,8 @@ def decode_tables(source: SourceText, form: type[T]) -> T:
     try:
         data: T = converted(tables, form)
     except msgspec.ValidationError as error:
+        from .form import form_faults, place_label
+
         found = form_faults(tables, form)[0].found or [((), str(error))]
         lines = [
             f"{source.file}:{line_of(source, path)}: {place_label(tables, path)}: {sentence(fault)}"

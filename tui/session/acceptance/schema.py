@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from tui.drive.profile.json_schema import described_parts
+import msgspec
+
 from tui.drive.profile.schema import Table
 
 from .step_file import STEPS_KEY
@@ -15,7 +16,7 @@ from .steps import MOST_STEPS, STEP_KINDS, AcceptanceTest
 def acceptance_schema() -> str:
     """Return the schema as text, made from the tables into which a file is decoded."""
     tables: list[type[Table]] = [AcceptanceTest, *STEP_KINDS.values()]
-    parts = described_parts(tables)
+    _, parts = msgspec.json.schema_components(tables, ref_template="#/$defs/{name}")
     for kind, form in STEP_KINDS.items():
         parts[form.__name__]["properties"]["kind"] = {"const": kind}
     whole: dict[str, Any] = parts.pop(AcceptanceTest.__name__)

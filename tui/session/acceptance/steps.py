@@ -12,117 +12,110 @@ from typing import Annotated, Literal
 from msgspec import Meta, field
 
 from tui.drive.chart import Direction
-from tui.drive.profile.schema import OrderId, Table
+from tui.drive.profile.schema import OrderId, Table, about
 
 MOST_STEPS = 100
 
 Hertz = Annotated[float, Meta(ge=0.1, le=1000)]
 StepSeconds = Annotated[float, Meta(ge=0.1, le=3600)]
-Tolerance = Annotated[float, Meta(ge=0, le=1000)]
+Tolerance = Annotated[float, Meta(ge=0.0, le=1000.0)]
 StepPercent = Annotated[float, Meta(ge=1, le=100)]
 
 
 class ValueLimits(Table, frozen=True, kw_only=True):
     """Lowest and highest allowed value."""
 
-    unit: str
-    """Unit of both: the drive's, or one that it can be converted to."""
-    min: float | None = None
-    """Lowest allowed value."""
-    max: float | None = None
-    """Highest allowed value."""
+    unit: Annotated[str, about("Unit of both: the drive's, or one that it can be converted to.")]
+    min: Annotated[float | None, about("Lowest allowed value.")] = None
+    max: Annotated[float | None, about("Highest allowed value.")] = None
 
 
 class AcceptanceStep(Table, frozen=True, kw_only=True):
     """Fields common to all steps."""
 
-    kind: str
-    """Kind of the step."""
-    name: str = ""
-    """Name of the step in the report."""
-    goes_on: bool = field(default=False, name="continue")
-    """True if the motor may be run in later steps even if this one fails."""
+    kind: Annotated[str, about("Kind of the step.")]
+    name: Annotated[str, about("Name of the step in the report.")] = ""
+    goes_on: Annotated[
+        bool,
+        about("True if the motor may be run in later steps even if this one fails."),
+    ] = field(default=False, name="continue")
 
 
 class SettingsStep(AcceptanceStep, frozen=True, kw_only=True):
     """Settings of the drive match a set, or these values."""
 
-    file: str = ""
-    """Parameter set, relative to the test file."""
-    values: dict[str, str] = {}
-    """Values by code, as they are shown: "3.0 s"."""
-    ignore: list[str] = []
-    """Codes of the set that may differ."""
+    file: Annotated[str, about("Parameter set, relative to the test file.")] = ""
+    values: Annotated[
+        dict[str, str], Meta(description='Values by code, as they are shown: "3.0 s".')
+    ] = {}
+    ignore: Annotated[list[str], about("Codes of the set that may differ.")] = []
 
 
 class RefusedStep(AcceptanceStep, frozen=True, kw_only=True):
     """References beyond the limits of the drive are refused; nothing is written."""
 
-    references: Annotated[list[str], Meta(min_length=1)]
-    """References as typed: "55Hz"."""
+    references: Annotated[
+        Annotated[list[str], Meta(min_length=1)], Meta(description='References as typed: "55Hz".')
+    ]
 
 
 class MotionStep(AcceptanceStep, frozen=True, kw_only=True):
     """A step that runs the motor."""
 
-    direction: Direction = "forward"
-    """Direction of the run command."""
-    hz: Hertz | None = None
-    """Reference in Hz; absent: the present reference."""
+    direction: Annotated[Direction, about("Direction of the run command.")] = "forward"
+    hz: Annotated[Hertz | None, about("Reference in Hz; absent: the present reference.")] = None
 
 
 class DirectionStep(MotionStep, frozen=True, kw_only=True):
     """The motor turns in the commanded direction."""
 
-    seconds: StepSeconds = 3.0
-    """Duration of the run."""
-    turns: Literal["", "right", "left"] = ""
-    """Direction that the person must see, toward the end of the shaft; empty: not asked."""
+    seconds: Annotated[StepSeconds, about("Duration of the run.")] = 3.0
+    turns: Annotated[
+        Literal["", "right", "left"],
+        about("Direction that the person must see, toward the end of the shaft; empty: not asked."),
+    ] = ""
 
 
 class RampStep(MotionStep, frozen=True, kw_only=True):
     """Acceleration and deceleration take the given times."""
 
-    up: StepSeconds | None = None
-    """Seconds from 0 Hz to `base`."""
-    down: StepSeconds | None = None
-    """Seconds from `base` to 0 Hz, by the ramp stop."""
-    base: Hertz | None = None
-    """Frequency to which the times apply; absent: `hz`."""
-    tolerance: Tolerance = 0.1
-    """Allowed difference in seconds."""
+    up: Annotated[StepSeconds | None, about("Seconds from 0 Hz to `base`.")] = None
+    down: Annotated[StepSeconds | None, about("Seconds from `base` to 0 Hz, by the ramp stop.")] = (
+        None
+    )
+    base: Annotated[Hertz | None, about("Frequency to which the times apply; absent: `hz`.")] = None
+    tolerance: Annotated[Tolerance, about("Allowed difference in seconds.")] = 0.1
 
 
 class SpeedsStep(MotionStep, frozen=True, kw_only=True):
     """Values at several speeds, each in its limits."""
 
-    percent: Annotated[list[StepPercent], Meta(min_length=1, max_length=20)] = field(
-        default_factory=lambda: [25.0, 50.0, 75.0, 100.0]
+    percent: Annotated[
+        list[StepPercent],
+        Meta(min_length=1, max_length=20),
+        about("Speeds in percent of `hz`."),
+    ] = field(default_factory=lambda: [25.0, 50.0, 75.0, 100.0])
+    seconds: Annotated[StepSeconds, about("Seconds at each speed.")] = 5.0
+    settle: Annotated[StepSeconds, about("Seconds within which each speed must be reached.")] = 20.0
+    tolerance: Annotated[Tolerance, about("Allowed difference of the output frequency in Hz.")] = (
+        0.5
     )
-    """Speeds in percent of `hz`."""
-    seconds: StepSeconds = 5.0
-    """Seconds at each speed."""
-    settle: StepSeconds = 20.0
-    """Seconds within which each speed must be reached."""
-    tolerance: Tolerance = 0.5
-    """Allowed difference of the output frequency in Hz."""
-    limits: dict[str, ValueLimits] = {}
-    """Limits by value: motor_current, torque, motor_voltage, motor_thermal, drive_thermal."""
+    limits: Annotated[
+        dict[str, ValueLimits],
+        about(
+            "Limits by value: motor_current, torque, motor_voltage, motor_thermal, drive_thermal."
+        ),
+    ] = {}
 
 
 class StopStep(MotionStep, frozen=True, kw_only=True):
     """A stop brings the motor to standstill in time."""
 
-    method: OrderId = "stop"
-    """Command that stops the motor."""
-    seconds: StepSeconds = 2.0
-    """Duration of the run before the stop."""
-    settle: StepSeconds = 20.0
-    """Seconds within which the speed must be reached."""
-    min: Tolerance = 0.0
-    """Least seconds to standstill."""
-    max: StepSeconds
-    """Most seconds to standstill."""
+    method: Annotated[OrderId, about("Command that stops the motor.")] = "stop"
+    seconds: Annotated[StepSeconds, about("Duration of the run before the stop.")] = 2.0
+    settle: Annotated[StepSeconds, about("Seconds within which the speed must be reached.")] = 20.0
+    min: Annotated[Tolerance, about("Least seconds to standstill.")] = 0.0
+    max: Annotated[StepSeconds, about("Most seconds to standstill.")]
 
 
 class LimitStep(MotionStep, frozen=True, kw_only=True):
@@ -131,27 +124,31 @@ class LimitStep(MotionStep, frozen=True, kw_only=True):
     It runs at high speed first, then gets a reference that is `over` Hz higher.
     """
 
-    over: Annotated[float, Meta(ge=0.5, le=3)] = 1.0
-    """Hz above the high speed of the drive."""
-    seconds: StepSeconds = 3.0
-    """Seconds with that reference."""
-    settle: StepSeconds = 20.0
-    """Seconds within which the high speed must be reached."""
-    tolerance: Annotated[float, Meta(ge=0.1, le=2)] = 0.3
-    """Allowed output frequency above the high speed in Hz."""
+    over: Annotated[
+        float,
+        Meta(ge=0.5, le=3),
+        about("Hz above the high speed of the drive."),
+    ] = 1.0
+    seconds: Annotated[StepSeconds, about("Seconds with that reference.")] = 3.0
+    settle: Annotated[
+        StepSeconds, about("Seconds within which the high speed must be reached.")
+    ] = 20.0
+    tolerance: Annotated[
+        float,
+        Meta(ge=0.1, le=2),
+        about("Allowed output frequency above the high speed in Hz."),
+    ] = 0.3
 
 
 class CommunicationLossStep(MotionStep, frozen=True, kw_only=True):
     """The drive reacts to communication loss as configured."""
 
-    timeout: StepSeconds
-    """Timeout that must be configured, in seconds."""
-    reaction: str = ""
-    """Reaction that must be configured, by its name; empty: any."""
-    turning: bool = False
-    """True to test with the motor turning."""
-    settle: StepSeconds = 20.0
-    """Seconds within which the speed must be reached."""
+    timeout: Annotated[StepSeconds, about("Timeout that must be configured, in seconds.")]
+    reaction: Annotated[
+        str, about("Reaction that must be configured, by its name; empty: any.")
+    ] = ""
+    turning: Annotated[bool, about("True to test with the motor turning.")] = False
+    settle: Annotated[StepSeconds, about("Seconds within which the speed must be reached.")] = 20.0
 
 
 class ResetStep(AcceptanceStep, frozen=True, kw_only=True):
@@ -176,12 +173,9 @@ STEP_KINDS: Mapping[str, type[AcceptanceStep]] = MappingProxyType(
 class AcceptanceTest(Table, frozen=True, kw_only=True):
     """A test file without its steps."""
 
-    format: Literal[1]
-    """Format of the file."""
-    name: str
-    """Title of the report."""
-    profile: str
-    """Profile of the drive."""
+    format: Annotated[Literal[1], about("Format of the file.")]
+    name: Annotated[str, about("Title of the report.")]
+    profile: Annotated[str, about("Profile of the drive.")]
 
 
 def moves_motor(step: AcceptanceStep) -> bool:

@@ -9,16 +9,16 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import msgspec
 from msgspec import Meta
 
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.converting import converted
 from tui.drive.profile.form import form_faults
-from tui.drive.profile.json_schema import described_parts
 from tui.drive.profile.person_file import raise_faults, read_person_file
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import CablingMaster, CablingPart, LineSchematic, Table
+from tui.drive.profile.schema import CablingMaster, CablingPart, LineSchematic, Table, about
 from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.sentences import any_of
 
@@ -34,69 +34,98 @@ CablingWay = Literal["rj45", "boxes", "sub_d"]
 class LineElement(Table, frozen=True, kw_only=True):
     """Fields common to the master and the stations."""
 
-    name: str = ""
-    """Name in the drawing and the reports."""
-    cable: PlanMeters | None = None
-    """Cable of the line from the element before, in m. The first element has none."""
-    polarization: PlanOhm | None = None
-    """Resistor to each of 5 V and common in this device, in ohm; 0 is none."""
-    terminator: PlanTerminator = "none"
-    """Terminator at this place: RC is 120 ohm with 1 nF, R is 150 ohm."""
-    timeout: PlanSeconds | None = None
-    """Master: its wait for a reply. Station: its communication timeout. In s."""
+    name: Annotated[str, about("Name in the drawing and the reports.")] = ""
+    cable: Annotated[
+        PlanMeters | None,
+        about("Cable of the line from the element before, in m. The first element has none."),
+    ] = None
+    polarization: Annotated[
+        PlanOhm | None,
+        about("Resistor to each of 5 V and common in this device, in ohm; 0 is none."),
+    ] = None
+    terminator: Annotated[
+        PlanTerminator,
+        about("Terminator at this place: RC is 120 ohm with 1 nF, R is 150 ohm."),
+    ] = "none"
+    timeout: Annotated[
+        PlanSeconds | None,
+        about("Master: its wait for a reply. Station: its communication timeout. In s."),
+    ] = None
 
 
 class PlanMaster(LineElement, frozen=True, kw_only=True):
     """The master of the line."""
 
-    kind: str = ""
-    """Kind of master in the tables of the manuals, for its cable: "TSX Micro"."""
-    position: Annotated[int, Meta(ge=0, le=247)] = 0
-    """Number of stations that are before the master on the line."""
+    kind: Annotated[
+        str,
+        Meta(
+            description='Kind of master in the tables of the manuals, for its cable: "TSX Micro".'
+        ),
+    ] = ""
+    position: Annotated[
+        int,
+        Meta(ge=0, le=247),
+        about("Number of stations that are before the master on the line."),
+    ] = 0
 
 
 class PlanStation(LineElement, frozen=True, kw_only=True):
     """A drive, or another device, on the line."""
 
-    address: Annotated[int, Meta(ge=0, le=247)]
-    """Its slave address."""
-    profile: str = ""
-    """Its profile; empty for a device of another kind."""
-    stub: PlanMeters | None = None
-    """Tap link from the line to the device, in m."""
-    box: str = ""
-    """Name of its junction box, if several stations share one. They follow each other."""
-    values: list[str] = []
-    """Codes that the master reads in each cycle (default: those that Monitor reads)."""
-    words: Annotated[int, Meta(ge=0, le=123)] | None = None
-    """Words read in each cycle from a device without a profile."""
-    writes: Annotated[int, Meta(ge=0, le=123)] = 0
-    """Words that the master writes in each cycle, such as command and reference: 2."""
-    turnaround: PlanSeconds | None = None
-    """Time from the end of a request to the reply, in s (default: that of the profile)."""
+    address: Annotated[int, Meta(ge=0, le=247), about("Its slave address.")]
+    profile: Annotated[str, about("Its profile; empty for a device of another kind.")] = ""
+    stub: Annotated[PlanMeters | None, about("Tap link from the line to the device, in m.")] = None
+    box: Annotated[
+        str,
+        about("Name of its junction box, if several stations share one. They follow each other."),
+    ] = ""
+    values: Annotated[
+        list[str],
+        about("Codes that the master reads in each cycle (default: those that Monitor reads)."),
+    ] = []
+    words: Annotated[
+        Annotated[int, Meta(ge=0, le=123)] | None,
+        about("Words read in each cycle from a device without a profile."),
+    ] = None
+    writes: Annotated[
+        int,
+        Meta(ge=0, le=123),
+        about("Words that the master writes in each cycle, such as command and reference: 2."),
+    ] = 0
+    turnaround: Annotated[
+        PlanSeconds | None,
+        about("Time from the end of a request to the reply, in s (default: that of the profile)."),
+    ] = None
 
 
 class PlantFile(Table, frozen=True, kw_only=True):
     """A planned line: its settings, its master and its stations in the order of the cable."""
 
-    format: Literal[1]
-    """Version of this form of file."""
-    name: str = "Line"
-    """Name of the line."""
-    baud: Annotated[int, Meta(ge=300, le=115200)] = 19200
-    """Baud rate in bit/s."""
-    characters: Annotated[str, Meta(pattern=r"^8[NEO][12]$")] = "8E1"
-    """Data bits, parity and stop bits."""
-    schematic: Literal["standard", "uni-telway", "jbus"] = "standard"
-    """Schematic of the line. Stations with 4.7 kohm make a standard one a mixed one."""
-    way: CablingWay = "rj45"
-    """Cabling: RJ45 splitters, boxes with screw terminals, or boxes with SUB-D sockets."""
-    period: PlanSeconds | None = None
-    """Wanted time from one cycle to the next, in s."""
-    master: PlanMaster = PlanMaster()
-    """The master."""
-    stations: Annotated[list[PlanStation], Meta(min_length=1, max_length=247)]
-    """The stations in the order of the cable."""
+    format: Annotated[Literal[1], about("Version of this form of file.")]
+    name: Annotated[str, about("Name of the line.")] = "Line"
+    baud: Annotated[int, Meta(ge=300, le=115200), about("Baud rate in bit/s.")] = 19200
+    characters: Annotated[
+        str,
+        Meta(pattern=r"^8[NEO][12]$"),
+        about("Data bits, parity and stop bits."),
+    ] = "8E1"
+    schematic: Annotated[
+        Literal["standard", "uni-telway", "jbus"],
+        about("Schematic of the line. Stations with 4.7 kohm make a standard one a mixed one."),
+    ] = "standard"
+    way: Annotated[
+        CablingWay,
+        about("Cabling: RJ45 splitters, boxes with screw terminals, or boxes with SUB-D sockets."),
+    ] = "rj45"
+    period: Annotated[
+        PlanSeconds | None, about("Wanted time from one cycle to the next, in s.")
+    ] = None
+    master: Annotated[PlanMaster, about("The master.")] = PlanMaster()
+    stations: Annotated[
+        list[PlanStation],
+        Meta(min_length=1, max_length=247),
+        about("The stations in the order of the cable."),
+    ]
 
 
 class PlantFileError(DriveError):
@@ -269,7 +298,8 @@ def _station_faults(plan: LinePlan, station: PlanStation) -> Iterator[tuple[str,
 
 def plant_schema() -> str:
     """Return the JSON Schema of the file for editors, made from its tables."""
-    parts = described_parts([PlantFile, PlanMaster, PlanStation])
+    forms = [PlantFile, PlanMaster, PlanStation]
+    _, parts = msgspec.json.schema_components(forms, ref_template="#/$defs/{name}")
     whole: dict[str, Any] = parts.pop(PlantFile.__name__)
     head = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
     return json.dumps({**head, **whole, "$defs": parts}, indent=2) + "\n"

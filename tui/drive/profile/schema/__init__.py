@@ -2,10 +2,8 @@
 
 Every struct is one table of the TOML file. Raw values are words as on the wire. Scales are decimal
 strings, so that values are never rounded by a float. Each module has one subject; other packages
-import from here.
+import from here. Annotations are not texts here: it takes time to evaluate some hundred of them.
 """
-
-from __future__ import annotations
 
 from .base import *
 from .channel import *

@@ -1,7 +1,5 @@
 """The state chart of a drive: its states and the commands allowed in them."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from msgspec import Meta
@@ -17,6 +15,7 @@ from .base import (
     Table,
     When,
     WordAddress,
+    about,
 )
 
 StateKind = Literal[
@@ -29,23 +28,30 @@ class State(Table, frozen=True, kw_only=True):
 
     id: Identifier
     name: str
-    kind: StateKind
+    kind: Annotated[StateKind, about("Meaning of the state, in the same terms for every family.")]
     mask: LongWord
-    value: LongWord
-    also: list[When] = []
-    """Further words that must fit; the state is unknown until they are read."""
+    value: Annotated[LongWord, about("Masked word while the drive is in this state.")]
+    also: Annotated[
+        list[When],
+        about("Further words that must fit; the state is unknown until they are read."),
+    ] = []
 
 
 class Transition(Table, frozen=True, kw_only=True):
     """A command that takes the drive from one state to another."""
 
-    number: str = ""
-    source: Identifier
-    target: Identifier
-    command: CommandBits | None = None
-    """Command word that triggers it; absent if the drive does so on its own."""
-    edge_bit: LongBitNumber | None = None
-    name: str = ""
+    number: Annotated[str, about("Number in the manual.")] = ""
+    source: Annotated[Identifier, about("State before the transition.")]
+    target: Annotated[Identifier, about("State after the transition.")]
+    command: Annotated[
+        CommandBits | None,
+        about("Command word that triggers it; absent if the drive does so on its own."),
+    ] = None
+    edge_bit: Annotated[
+        LongBitNumber | None,
+        about("Bit whose rising edge triggers it; absent if the whole word does."),
+    ] = None
+    name: Annotated[str, about("Name of the command or event in the manual.")] = ""
 
 
 class DirectionBit(Table, frozen=True, kw_only=True):
@@ -53,7 +59,9 @@ class DirectionBit(Table, frozen=True, kw_only=True):
 
     parameter: str
     bit: LongBitNumber
-    reverse: Literal[0, 1] = 1
+    reverse: Annotated[
+        Literal[0, 1], about("Value of the bit while the motor runs in reverse.")
+    ] = 1
 
 
 class StatusBit(Table, frozen=True, kw_only=True):
@@ -61,7 +69,7 @@ class StatusBit(Table, frozen=True, kw_only=True):
 
     parameter: str
     bit: LongBitNumber
-    value: Literal[0, 1] = 1
+    value: Annotated[Literal[0, 1], about("Value of the bit for which the meaning applies.")] = 1
 
 
 class ChannelBits(Table, frozen=True, kw_only=True):
@@ -69,9 +77,10 @@ class ChannelBits(Table, frozen=True, kw_only=True):
 
     parameter: str
     shift: Annotated[int, Meta(ge=0, le=15)]
-    mask: Annotated[int, Meta(ge=1, le=0xFFFF)]
-    """Mask applied after the shift."""
-    names: dict[str, str]
+    mask: Annotated[int, Meta(ge=1, le=0xFFFF), about("Mask applied after the shift.")]
+    names: Annotated[
+        dict[str, str], about("Command channels by the value of those bits, in decimal.")
+    ]
 
 
 OrderId = Literal[
@@ -91,10 +100,14 @@ OrderId = Literal[
 class OrderWait(Table, frozen=True, kw_only=True):
     """A wait after a word of a command, before its next word."""
 
-    states: list[Identifier] = []
-    """States of which one must be reached; empty: only the time passes."""
-    ms: Annotated[int, Meta(ge=0, le=5000)] | None = None
-    """Milliseconds to wait, with `states` at most (default: 2000)."""
+    states: Annotated[
+        list[Identifier],
+        about("States of which one must be reached; empty: only the time passes."),
+    ] = []
+    ms: Annotated[
+        Annotated[int, Meta(ge=0, le=5000)] | None,
+        about("Milliseconds to wait, with `states` at most (default: 2000)."),
+    ] = None
 
     @property
     def seconds(self) -> float:
@@ -110,23 +123,22 @@ class Order(Table, frozen=True, kw_only=True):
     Of several with the same id, the first whose states and conditions hold is used.
     """
 
-    id: OrderId
+    id: Annotated[OrderId, about("Command that the words carry out.")]
     name: str
-    words: list[CommandBits]
-    waits: list[OrderWait] = []
-    """Waits between the words: the first one after the first word."""
-    parameter: str = ""
-    """Register of the words; empty: the chart's command word."""
-    states: list[Identifier] = []
-    """States in which it is allowed; empty: any."""
-    when: list[When] = []
-    """Conditions that must be known and hold."""
-    broadcast: bool = False
-    """True if its word cannot start a motor on any drive that receives it."""
-    clears: list[str] = []
-    """Words that it resets to their initial values."""
-    follows: str = ""
-    """Further consequences, shown before it is sent; sentences."""
+    words: Annotated[list[CommandBits], about("Words written in sequence.")]
+    waits: Annotated[
+        list[OrderWait],
+        about("Waits between the words: the first one after the first word."),
+    ] = []
+    parameter: Annotated[str, about("Register of the words; empty: the chart's command word.")] = ""
+    states: Annotated[list[Identifier], about("States in which it is allowed; empty: any.")] = []
+    when: Annotated[list[When], about("Conditions that must be known and hold.")] = []
+    broadcast: Annotated[
+        bool,
+        about("True if its word cannot start a motor on any drive that receives it."),
+    ] = False
+    clears: Annotated[list[str], about("Words that it resets to their initial values.")] = []
+    follows: Annotated[str, about("Further consequences, shown before it is sent; sentences.")] = ""
     note: str = ""
     confidence: Confidence = "manual"
 
@@ -136,21 +148,20 @@ class Interlock(Table, frozen=True, kw_only=True):
 
     parameter: str
     mask: LongWord = 0xFFFF
-    values: list[int]
-    """Masked raw values with which the command is allowed."""
-    orders: list[OrderId] = []
-    """Commands that it applies to; empty: those that run or brake."""
-    when: list[When] = []
-    """Conditions for the interlock."""
-    text: str
-    """Problem if it is not met, as a sentence."""
-    remedy: str = ""
+    values: Annotated[list[int], about("Masked raw values with which the command is allowed.")]
+    orders: Annotated[
+        list[OrderId],
+        about("Commands that it applies to; empty: those that run or brake."),
+    ] = []
+    when: Annotated[list[When], about("Conditions for the interlock.")] = []
+    text: Annotated[str, about("Problem if it is not met, as a sentence.")]
+    remedy: Annotated[str, about("Remedy, as a sentence.")] = ""
 
 
 class OptionChoice(Table, frozen=True, kw_only=True):
     """One setting of an option: the masked bits and their name."""
 
-    bits: LongWord
+    bits: Annotated[LongWord, about("Masked bits of the option.")]
     name: str
 
 
@@ -161,8 +172,10 @@ class CommandOption(Table, frozen=True, kw_only=True):
     name: str
     parameter: str
     mask: LongWord
-    choices: list[OptionChoice]
-    stopped_only: bool = False
+    choices: Annotated[list[OptionChoice], about("Settings of the option.")]
+    stopped_only: Annotated[
+        bool, about("True if it can be changed only with the motor stopped.")
+    ] = False
     note: str = ""
     confidence: Confidence = "manual"
 
@@ -172,25 +185,48 @@ class Chart(Table, frozen=True, kw_only=True):
 
     id: Identifier
     name: str
-    kind: Identifier = "plain"
-    """Behavior of a simulated drive beyond its states and commands."""
-    runs_in: Identifier | None = None
-    """The running state that a start reaches through the transitions, one command at a time;
-    absent: the words of a command are written unchanged."""
-    when: When | None = None
-    """Condition for the chart; absent: always, or if no other applies."""
-    status: str
-    command: str = ""
-    states: list[State]
-    transitions: list[Transition] = []
-    orders: list[Order] = []
-    interlocks: list[Interlock] = []
-    options: list[CommandOption] = []
-    direction: DirectionBit | None = None
-    reached: StatusBit | None = None
-    alarm: StatusBit | None = None
-    local: StatusBit | None = None
-    channel: ChannelBits | None = None
+    kind: Annotated[
+        Identifier,
+        about("Behavior of a simulated drive beyond its states and commands."),
+    ] = "plain"
+    runs_in: Annotated[
+        Identifier | None,
+        about(
+            "The running state that a start reaches through the transitions, one "
+            "command at a time; absent: the words of a command are written unchanged."
+        ),
+    ] = None
+    when: Annotated[
+        When | None,
+        about("Condition for the chart; absent: always, or if no other applies."),
+    ] = None
+    status: Annotated[str, about("Code of the status word.")]
+    command: Annotated[
+        str, about("Code of the command word; empty if the drive cannot be commanded.")
+    ] = ""
+    states: Annotated[list[State], about("States in order of evaluation; the first match applies.")]
+    transitions: Annotated[
+        list[Transition], about("Commands and events that lead from state to state.")
+    ] = []
+    orders: Annotated[list[Order], about("Commands available to the user, as words.")] = []
+    interlocks: Annotated[
+        list[Interlock], about("Conditions for a command that can move the motor.")
+    ] = []
+    options: Annotated[
+        list[CommandOption],
+        about("Bits of a command word that are kept between commands."),
+    ] = []
+    direction: Annotated[
+        DirectionBit | None, about("Bit that shows the direction of rotation.")
+    ] = None
+    reached: Annotated[
+        StatusBit | None, about("Bit that shows that the reference has been reached.")
+    ] = None
+    alarm: Annotated[StatusBit | None, about("Bit that shows an alarm.")] = None
+    local: Annotated[
+        StatusBit | None, about("Bit that shows that the drive is under local control.")
+    ] = None
+    channel: Annotated[ChannelBits | None, about("Bits that show the command channel.")] = None
     note: str = ""
     source: str = ""
     confidence: Confidence = "manual"
@@ -205,8 +241,8 @@ class Chart(Table, frozen=True, kw_only=True):
 class CommandExample(Table, frozen=True, kw_only=True):
     """A complete command word and its effect, for readers of raw words."""
 
-    word: LongWord
-    does: str
+    word: Annotated[LongWord, about("Complete command word.")]
+    does: Annotated[str, about("Effect of the word.")]
     note: str = ""
     confidence: Confidence = "manual"
 
@@ -214,21 +250,29 @@ class CommandExample(Table, frozen=True, kw_only=True):
 class ScaleWhen(When, frozen=True, kw_only=True):
     """A condition on another word; if it is not met, references have another scale."""
 
-    otherwise: str
-    """Problem if the condition is not met, and the remedy, as sentences."""
+    otherwise: Annotated[
+        str, about("Problem if the condition is not met, and the remedy, as sentences.")
+    ]
 
 
 class ReferenceWay(Table, frozen=True, kw_only=True):
     """A way to give the drive its frequency or speed."""
 
     parameter: str
-    kind: Literal["frequency", "speed"]
-    signed: bool = False
-    reverse: Literal["command", "negative"] = "command"
-    """Selection of the reverse direction: by the command, or by a negative reference."""
-    feedback: str = ""
-    scale_when: ScaleWhen | None = None
-    """Condition for the scale of this profile."""
+    kind: Annotated[Literal["frequency", "speed"], about("Type of reference: frequency or speed.")]
+    signed: Annotated[bool, about("True if a negative reference runs the motor in reverse.")] = (
+        False
+    )
+    reverse: Annotated[
+        Literal["command", "negative"],
+        about("Selection of the reverse direction: by the command, or by a negative reference."),
+    ] = "command"
+    feedback: Annotated[
+        str, about("Code of the word that shows the reference accepted by the drive.")
+    ] = ""
+    scale_when: Annotated[ScaleWhen | None, about("Condition for the scale of this profile.")] = (
+        None
+    )
     note: str = ""
 
 
@@ -236,10 +280,14 @@ class TeachableReference(Table, frozen=True, kw_only=True):
     """A word of unknown scale that takes the reference once its scale is learned and confirmed."""
 
     parameter: str
-    bits: WordAddress = 0
-    """Bits of the chart's command word that select it; set with each run command."""
-    most: str = ""
-    """Parameter that contains the highest reference, once learned in the same unit."""
+    bits: Annotated[
+        WordAddress,
+        about("Bits of the chart's command word that select it; set with each run command."),
+    ] = 0
+    most: Annotated[
+        str,
+        about("Parameter that contains the highest reference, once learned in the same unit."),
+    ] = ""
     note: str = ""
     source: str = ""
     confidence: Confidence = "unverified"

@@ -1,10 +1,8 @@
 """Form of a file of evidence: what one drive showed about the statements of a profile."""
 
-from __future__ import annotations
+from typing import Annotated, Literal
 
-from typing import Literal
-
-from .base import Table
+from .base import Table, about
 
 EvidenceResult = Literal["confirmed", "contradicted", "open"]
 EvidenceSubject = Literal["identity", "address", "range", "value", "frame", "command", "reference"]
@@ -18,42 +16,54 @@ class EvidenceDrive(Table, frozen=True, kw_only=True):
 
     vendor: str = ""
     reference: str = ""
-    firmware: str = ""
-    """Version that the drive reports; empty if it reports none."""
-    kind: EvidenceKind
-    """`drive` if a person said that it is a real one. Only then does the file prove anything."""
-    link: str
-    """Kind and settings of the line, without its name: RTU 19200 8E1."""
+    firmware: Annotated[str, about("Version that the drive reports; empty if it reports none.")] = (
+        ""
+    )
+    kind: Annotated[
+        EvidenceKind,
+        about(
+            "`drive` if a person said that it is a real one. Only then does the file "
+            "prove anything."
+        ),
+    ]
+    link: Annotated[str, about("Kind and settings of the line, without its name: RTU 19200 8E1.")]
 
 
 class EvidenceFinding(Table, frozen=True, kw_only=True):
     """EvidenceResult for one statement of the profile."""
 
-    subject: EvidenceSubject
-    """`address`: the parameter can be read there. `range`: its value is one that the profile lets
-    it have. `value`: the display shows the same value. `frame`: the reply has the printed form.
-    `command`: the drive without its motor did what the command says. `reference`: its feedback
-    agreed with the reference."""
-    name: str
-    """Code of the parameter, the section of the manual with the frame, or chart and command; empty
-    for the drive."""
-    statement: str = ""
-    """The statement as tested, so that a changed profile is not proved by it."""
+    subject: Annotated[
+        EvidenceSubject,
+        about(
+            "`address`: the parameter can be read there. `range`: its value is one "
+            "that the profile lets it have. `value`: the display shows the same value. "
+            "`frame`: the reply has the printed form. `command`: the drive without its "
+            "motor did what the command says. `reference`: its feedback agreed with "
+            "the reference."
+        ),
+    ]
+    name: Annotated[
+        str,
+        about(
+            "Code of the parameter, the section of the manual with the frame, or chart "
+            "and command; empty for the drive."
+        ),
+    ]
+    statement: Annotated[
+        str,
+        about("The statement as tested, so that a changed profile is not proved by it."),
+    ] = ""
     result: EvidenceResult
-    seen: str = ""
-    """Observation on this drive."""
+    seen: Annotated[str, about("Observation on this drive.")] = ""
 
 
 class ProfileEvidence(Table, frozen=True, kw_only=True):
     """One test of one drive."""
 
     format: Literal[1] = 1
-    profile: str
-    """Id of the profile."""
-    date: str
-    """Time of the test, with its zone."""
-    program: str
-    """Version of Drive Panel."""
+    profile: Annotated[str, about("Id of the profile.")]
+    date: Annotated[str, about("Time of the test, with its zone.")]
+    program: Annotated[str, about("Version of Drive Panel.")]
     tested: EvidenceDrive
     findings: list[EvidenceFinding]
 

@@ -1,13 +1,11 @@
 """Switches between the sources of command or reference and the motor."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import Confidence, Identifier, Table, When, WordAddress
+from .base import Confidence, Identifier, Table, When, WordAddress, about
 
 PathPlace = tuple[str | int, ...]
 """A place in the list of paths."""
@@ -16,64 +14,80 @@ PathPlace = tuple[str | int, ...]
 class PathSource(Table, frozen=True, kw_only=True):
     """A source of command or reference: a fixed one, or the one that a parameter selects."""
 
-    name: str = ""
-    """Name of a fixed source; empty if `parameter` selects the source."""
-    parameter: str = ""
-    """Parameter whose value selects the source."""
-    mask: WordAddress = 0xFFFF
-    """Bits that select the source, before the shift."""
+    name: Annotated[
+        str, about("Name of a fixed source; empty if `parameter` selects the source.")
+    ] = ""
+    parameter: Annotated[str, about("Parameter whose value selects the source.")] = ""
+    mask: Annotated[WordAddress, about("Bits that select the source, before the shift.")] = 0xFFFF
     shift: Annotated[int, Meta(ge=0, le=15)] = 0
-    line: list[int] = []
-    """Values, after mask and shift, that mean this line."""
-    is_line: bool = False
-    """True if a fixed source is this line."""
-    names: dict[str, str] = {}
-    """Names of the values; a missing one has its name from the parameter."""
-    word: str = ""
-    """Word with the present value of a fixed source."""
-    words: dict[str, str] = {}
-    """Words with the present value, by the selecting value in decimal."""
+    line: Annotated[list[int], about("Values, after mask and shift, that mean this line.")] = []
+    is_line: Annotated[bool, about("True if a fixed source is this line.")] = False
+    names: Annotated[
+        dict[str, str],
+        about("Names of the values; a missing one has its name from the parameter."),
+    ] = {}
+    word: Annotated[str, about("Word with the present value of a fixed source.")] = ""
+    words: Annotated[
+        dict[str, str],
+        about("Words with the present value, by the selecting value in decimal."),
+    ] = {}
 
 
 class PathPosition(Table, frozen=True, kw_only=True):
     """A position of a switch, if its conditions hold; the first one that holds applies."""
 
-    contact: Annotated[int, Meta(ge=0, le=1)]
-    """Contact that is connected: 0 is the path so far, 1 is `other`."""
-    when: list[When] = []
-    """Conditions for the position; all must hold."""
-    state: str = ""
-    """Shown as the state of the switch; empty: the value of its parameter."""
-    how: str = ""
-    """Action that brings the switch into the position, in the imperative; empty: its parameter."""
+    contact: Annotated[
+        int,
+        Meta(ge=0, le=1),
+        about("Contact that is connected: 0 is the path so far, 1 is `other`."),
+    ]
+    when: Annotated[list[When], about("Conditions for the position; all must hold.")] = []
+    state: Annotated[
+        str,
+        about("Shown as the state of the switch; empty: the value of its parameter."),
+    ] = ""
+    how: Annotated[
+        str,
+        about(
+            "Action that brings the switch into the position, in the imperative; "
+            "empty: its parameter."
+        ),
+    ] = ""
 
 
 class PathSwitch(Table, frozen=True, kw_only=True):
     """One switch of a signal path."""
 
-    name: str
-    parameter: str = ""
-    """Parameter that sets the switch; empty if no parameter does."""
-    names: dict[str, str] = {}
-    """Short names of the parameter's values."""
-    other: PathSource
-    """Source that the switch connects instead of the path so far."""
-    positions: Annotated[list[PathPosition], Meta(min_length=1)]
+    name: Annotated[str, about("Name of the switch, as short as its code.")]
+    parameter: Annotated[
+        str, about("Parameter that sets the switch; empty if no parameter does.")
+    ] = ""
+    names: Annotated[dict[str, str], about("Short names of the parameter's values.")] = {}
+    other: Annotated[
+        PathSource, about("Source that the switch connects instead of the path so far.")
+    ]
+    positions: Annotated[
+        list[PathPosition],
+        Meta(min_length=1),
+        about("Positions of the switch; the first one whose conditions hold applies."),
+    ]
 
 
 class SignalPath(Table, frozen=True, kw_only=True):
     """The way of the command or the reference to the motor, if its conditions hold."""
 
     id: Identifier
-    carries: Literal["command", "reference"]
-    when: list[When] = []
-    """Conditions for the path; all must hold. The first path that applies is used."""
-    first: PathSource
-    """The source at the beginning of the path."""
-    switches: list[PathSwitch] = []
-    """Switches from the source to the motor."""
-    reports: When | None = None
-    """Word of the drive that shows whether this line is the active source."""
+    carries: Annotated[Literal["command", "reference"], about("Signal on the path.")]
+    when: Annotated[
+        list[When],
+        about("Conditions for the path; all must hold. The first path that applies is used."),
+    ] = []
+    first: Annotated[PathSource, about("The source at the beginning of the path.")]
+    switches: Annotated[list[PathSwitch], about("Switches from the source to the motor.")] = []
+    reports: Annotated[
+        When | None,
+        about("Word of the drive that shows whether this line is the active source."),
+    ] = None
     note: str = ""
     source: str
     confidence: Confidence

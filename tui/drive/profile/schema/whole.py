@@ -1,12 +1,20 @@
 """A whole profile file, with its blocks, control sources, memory commands and first steps."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import Confidence, Effective, Identifier, RawWord, ReadCount, Table, When, WordAddress
+from .base import (
+    Confidence,
+    Effective,
+    Identifier,
+    RawWord,
+    ReadCount,
+    Table,
+    When,
+    WordAddress,
+    about,
+)
 from .channel import Channels
 from .chart import Chart, CommandExample, ReferenceWay, TeachableReference
 from .identification import Erratum, Identification, ProfileHead, Source
@@ -33,19 +41,25 @@ class StartUpStep(Table, frozen=True, kw_only=True):
     Their parameters, in this order, are the group Commissioning of the editor.
     """
 
-    step: str
-    """Short name of the step."""
-    text: str
-    """Decision or task for the technician at the machine."""
-    parameters: list[str] = []
-    """Codes in the order in which they are set or checked."""
-    action: Literal["", "auto-tune", "save", "first-run", "take-control"] = ""
-    """Action of the step besides setting values."""
-    stopped_only: bool = False
+    step: Annotated[str, about("Short name of the step.")]
+    text: Annotated[str, about("Decision or task for the technician at the machine.")]
+    parameters: Annotated[
+        list[str], about("Codes in the order in which they are set or checked.")
+    ] = []
+    action: Annotated[
+        Literal["", "auto-tune", "save", "first-run", "take-control"],
+        about("Action of the step besides setting values."),
+    ] = ""
+    stopped_only: Annotated[bool, about("True if the motor must be at standstill.")] = False
     note: str = ""
     source: str
-    confidence: Confidence | Literal["practice"]
-    """Certainty that the step belongs here; `practice` is general practice, from no document."""
+    confidence: Annotated[
+        Confidence | Literal["practice"],
+        about(
+            "Certainty that the step belongs here; `practice` is general practice, "
+            "from no document."
+        ),
+    ]
 
 
 class Predecessor(Table, frozen=True, kw_only=True):
@@ -55,14 +69,13 @@ class Predecessor(Table, frozen=True, kw_only=True):
     reported, and never written.
     """
 
-    profile: Identifier
-    """Id of the profile of that family."""
-    same_codes: bool = False
-    """True if settings with the same code mean the same."""
-    codes: dict[str, str] = {}
-    """Codes of this family by code of the predecessor."""
-    unlike: dict[str, str] = {}
-    """Reason by code of the predecessor, for settings that are not carried over."""
+    profile: Annotated[Identifier, about("Id of the profile of that family.")]
+    same_codes: Annotated[bool, about("True if settings with the same code mean the same.")] = False
+    codes: Annotated[dict[str, str], about("Codes of this family by code of the predecessor.")] = {}
+    unlike: Annotated[
+        dict[str, str],
+        about("Reason by code of the predecessor, for settings that are not carried over."),
+    ] = {}
     note: str = ""
     source: str
     confidence: Confidence
@@ -78,20 +91,26 @@ class MemoryOrder(Table, frozen=True, kw_only=True):
     """A word that saves settings or restores factory settings."""
 
     parameter: str
-    raw: RawWord
-    """The value, or the bits that are set while the others are kept."""
-    bit: bool = False
-    """True if `raw` contains bits and the word's other bits are kept."""
-    does: str
-    """Exact effect, shown for confirmation."""
-    at_rest_mask: RawWord = 0
-    """Bits of the extended status word that must be 0 beforehand."""
-    keeps_value: bool = False
-    """True if the word keeps the written value and does not show completion."""
-    done: When | None = None
-    """Condition that shows completion, if the word itself does not."""
-    groups: str = ""
-    """A word that selects the groups of settings; nothing happens while it is 0."""
+    raw: Annotated[RawWord, about("The value, or the bits that are set while the others are kept.")]
+    bit: Annotated[
+        bool, about("True if `raw` contains bits and the word's other bits are kept.")
+    ] = False
+    does: Annotated[str, about("Exact effect, shown for confirmation.")]
+    at_rest_mask: Annotated[
+        RawWord, about("Bits of the extended status word that must be 0 beforehand.")
+    ] = 0
+    keeps_value: Annotated[
+        bool,
+        about("True if the word keeps the written value and does not show completion."),
+    ] = False
+    done: Annotated[
+        When | None,
+        about("Condition that shows completion, if the word itself does not."),
+    ] = None
+    groups: Annotated[
+        str,
+        about("A word that selects the groups of settings; nothing happens while it is 0."),
+    ] = ""
     source: str = ""
 
 
@@ -100,18 +119,23 @@ class EnterWord(Table, frozen=True, kw_only=True):
 
     parameter: str
     raw: RawWord
-    when: When | None = None
-    """Condition under which it is needed; absent: always."""
+    when: Annotated[When | None, about("Condition under which it is needed; absent: always.")] = (
+        None
+    )
     source: str = ""
 
 
 class Eeprom(Table, frozen=True, kw_only=True):
     """Endurance of a drive's EEPROM."""
 
-    writes: Annotated[int, Meta(ge=1)] | None = None
-    """Number of writes that it lasts for; absent if no document states it."""
-    also_saved_by: list[When] = []
-    """Words besides `save` that store all settings when they get these values."""
+    writes: Annotated[
+        Annotated[int, Meta(ge=1)] | None,
+        about("Number of writes that it lasts for; absent if no document states it."),
+    ] = None
+    also_saved_by: Annotated[
+        list[When],
+        about("Words besides `save` that store all settings when they get these values."),
+    ] = []
     source: str = ""
     confidence: Confidence = "manual"
 
@@ -119,29 +143,36 @@ class Eeprom(Table, frozen=True, kw_only=True):
 class MemoryOrders(Table, frozen=True, kw_only=True):
     """Commands to a drive's memory; unknown ones are omitted."""
 
-    enter: EnterWord | None = None
-    """Written after each setting, before it is read back."""
-    save: MemoryOrder | None = None
-    factory: MemoryOrder | None = None
-    eeprom: Eeprom = Eeprom()
-    """Life of the EEPROM, and further words that save."""
-    busy_mask: RawWord = 0
-    """Bits of the extended status word that are 1 while the EEPROM is written."""
+    enter: Annotated[
+        EnterWord | None, about("Written after each setting, before it is read back.")
+    ] = None
+    save: Annotated[MemoryOrder | None, about("Command that saves the settings.")] = None
+    factory: Annotated[MemoryOrder | None, about("Command that restores the factory settings.")] = (
+        None
+    )
+    eeprom: Annotated[Eeprom, about("Life of the EEPROM, and further words that save.")] = Eeprom()
+    busy_mask: Annotated[
+        RawWord,
+        about("Bits of the extended status word that are 1 while the EEPROM is written."),
+    ] = 0
 
 
 class Setting(Table, frozen=True, kw_only=True):
     """A parameter and its required raw value."""
 
     parameter: str
-    value: RawWord
+    value: Annotated[RawWord, about("Required raw value.")]
 
 
 class Way(Table, frozen=True, kw_only=True):
     """Source of the command or the reference, or the selection between two."""
 
-    sources: Annotated[list[str], Meta(min_length=1, max_length=2)]
-    """One source, or two: without the switch and with it."""
-    switch: str = ""
+    sources: Annotated[
+        list[str],
+        Meta(min_length=1, max_length=2),
+        about("One source, or two: without the switch and with it."),
+    ]
+    switch: Annotated[str, about("Switch between two sources, in words.")] = ""
 
 
 class ControlSource(Table, frozen=True, kw_only=True):
@@ -149,10 +180,9 @@ class ControlSource(Table, frozen=True, kw_only=True):
 
     id: Identifier
     name: str
-    command: Way
-    reference: Way
-    settings: list[Setting]
-    """Settings that select it, in write order."""
+    command: Annotated[Way, about("Source of the command.")]
+    reference: Annotated[Way, about("Source of the reference.")]
+    settings: Annotated[list[Setting], about("Settings that select it, in write order.")]
     note: str = ""
     source: str = ""
 
@@ -169,20 +199,31 @@ class Block(Table, frozen=True, kw_only=True):
 
     id: Identifier
     name: str
-    direction: Literal["read", "write"]
-    address: WordAddress
-    min_words: ReadCount = 1
-    max_words: ReadCount
-    slots: list[str]
-    """Parameters that select the content of each slot, in order."""
-    values: list[str] = []
-    """Parameters that carry the values, if they are separate parameters."""
-    selects_by: Literal["choice", "address"]
-    choices: list[BlockChoice] = []
-    fixed_start: bool = False
-    """True if a read must begin at `address`; otherwise any part can be read."""
-    write_when: Literal["any", "stopped"] = "any"
-    effective: Effective = "at-once"
+    direction: Annotated[
+        Literal["read", "write"], about("Direction of the block: read or written.")
+    ]
+    address: Annotated[WordAddress, about("Wire address of the first word.")]
+    min_words: Annotated[ReadCount, about("Minimum number of words per access.")] = 1
+    max_words: Annotated[ReadCount, about("Maximum number of words per access.")]
+    slots: Annotated[list[str], about("Parameters that select the content of each slot, in order.")]
+    values: Annotated[
+        list[str],
+        about("Parameters that carry the values, if they are separate parameters."),
+    ] = []
+    selects_by: Annotated[
+        Literal["choice", "address"],
+        about("Content of a slot: a number from `choices`, or a wire address."),
+    ]
+    choices: Annotated[list[BlockChoice], about("Parameter for each number in a slot.")] = []
+    fixed_start: Annotated[
+        bool,
+        about("True if a read must begin at `address`; otherwise any part can be read."),
+    ] = False
+    write_when: Annotated[
+        Literal["any", "stopped"],
+        about("When slots can be written: any time, or only with the motor stopped."),
+    ] = "any"
+    effective: Annotated[Effective, about("When a changed slot takes effect.")] = "at-once"
     note: str = ""
     source: str = ""
 
@@ -190,41 +231,77 @@ class Block(Table, frozen=True, kw_only=True):
 class ProfileData(Table, frozen=True, kw_only=True):
     """A whole profile file."""
 
-    profile: ProfileHead
-    sources: list[Source] = []
-    errata: list[Erratum] = []
-    identification: Identification = Identification()
-    link: LinkSettings
-    addresses: Addresses = Addresses()
-    functions: list[Function]
-    port_counters: list[PortCounters] = []
-    reading: ReadShapes = ReadShapes()
-    blocks: list[Block] = []
-    exceptions: list[ExceptionCode] = []
-    frames: list[ProfileFrame] = []
-    charts: list[Chart] = []
-    command_examples: list[CommandExample] = []
-    references: list[ReferenceWay] = []
-    teachable_references: list[TeachableReference] = []
-    faults: Faults = Faults()
-    monitoring: Monitoring
-    channels: Channels = Channels()
-    control_sources: list[ControlSource] = []
-    signal_paths: list[SignalPath] = []
-    communication_fault: CommunicationFault | None = None
-    memory: MemoryOrders = MemoryOrders()
-    start_up: list[StartUpStep] = []
-    predecessors: list[Predecessor] = []
-    connectors: list[Connector] = []
-    line_rules: list[LineRule] = []
-    wiring: Wiring = Wiring()
-    schematics: list[LineSchematic] = []
-    parts: list[CablingPart] = []
-    masters: list[CablingMaster] = []
-    keypad_functions: list[KeypadFunction] = []
-    groups: list[ParameterGroup] = []
-    enumerations: list[Enumeration] = []
-    parameters: list[Parameter]
+    profile: Annotated[ProfileHead, about("Head of the file; must be the first table.")]
+    sources: Annotated[list[Source], about("Documents from which the facts were taken.")] = []
+    errata: Annotated[list[Erratum], about("Errors in the manuals.")] = []
+    identification: Annotated[Identification, about("Recognition of the drive.")] = Identification()
+    link: Annotated[LinkSettings, about("Factory line settings and their parameters.")]
+    addresses: Annotated[Addresses, about("Slave addresses.")] = Addresses()
+    functions: Annotated[list[Function], about("Modbus functions and their limits.")]
+    port_counters: Annotated[
+        list[PortCounters], about("Parameters that count frames, by port.")
+    ] = []
+    reading: Annotated[ReadShapes, about("Reads that the drive answers.")] = ReadShapes()
+    blocks: Annotated[list[Block], about("Indirect blocks and communication scanners.")] = []
+    exceptions: Annotated[list[ExceptionCode], about("Meaning of exception codes.")] = []
+    frames: Annotated[list[ProfileFrame], about("Example frames that the drive answers.")] = []
+    charts: Annotated[list[Chart], about("State charts and their commands.")] = []
+    command_examples: Annotated[
+        list[CommandExample], about("Complete command words and their effects.")
+    ] = []
+    references: Annotated[
+        list[ReferenceWay], about("Ways to give the drive its frequency or speed.")
+    ] = []
+    teachable_references: Annotated[
+        list[TeachableReference],
+        about("Words that can take the reference once their scale is learned."),
+    ] = []
+    faults: Annotated[Faults, about("Fault registers and the meaning of faults.")] = Faults()
+    monitoring: Annotated[Monitoring, about("Monitored values.")]
+    channels: Annotated[
+        Channels, about("Words that show the active command and reference channels.")
+    ] = Channels()
+    control_sources: Annotated[
+        list[ControlSource], about("Configurations of command and reference source.")
+    ] = []
+    signal_paths: Annotated[
+        list[SignalPath],
+        about("Switches between the sources of command and reference and the motor."),
+    ] = []
+    communication_fault: Annotated[
+        CommunicationFault | None, about("The drive's communication monitoring.")
+    ] = None
+    memory: Annotated[
+        MemoryOrders, about("Words that save settings or restore factory settings.")
+    ] = MemoryOrders()
+    start_up: Annotated[
+        list[StartUpStep], about("First commissioning in order, one table per step.")
+    ] = []
+    predecessors: Annotated[
+        list[Predecessor],
+        about("Families that this one replaces, and settings that mean the same."),
+    ] = []
+    connectors: Annotated[list[Connector], about("Connectors and their pins.")] = []
+    line_rules: Annotated[list[LineRule], about("Rules for the wiring.")] = []
+    wiring: Annotated[Wiring, about("Facts to know before touching the line or the drive.")] = (
+        Wiring()
+    )
+    schematics: Annotated[
+        list[LineSchematic], about("Schematics of the line, with their limits.")
+    ] = []
+    parts: Annotated[list[CablingPart], about("Parts for the line, by catalog number.")] = []
+    masters: Annotated[list[CablingMaster], about("Cables from the master to the line.")] = []
+    keypad_functions: Annotated[
+        list[KeypadFunction],
+        about("Functions of the keypad without an address on the line."),
+    ] = []
+    groups: Annotated[list[ParameterGroup], about("Content of groups that hold no settings.")] = []
+    enumerations: Annotated[
+        list[Enumeration], about("Names of raw values that several parameters share.")
+    ] = []
+    parameters: Annotated[
+        list[Parameter], about("Parameters, one table each; must be last in the file.")
+    ]
 
     @property
     def status_codes(self) -> tuple[str, ...]:

@@ -1,18 +1,16 @@
 """Wiring facts of a family: warnings, lamps, names of signals, waiting times."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import Confidence, DecimalText, Identifier, Table
+from .base import Confidence, DecimalText, Identifier, Table, about
 
 
 class FamilyWarning(Table, frozen=True, kw_only=True):
     """A fact that surprises, injures or damages, as a sentence."""
 
-    text: str
+    text: Annotated[str, about("Warning, as a sentence.")]
     source: str = ""
     confidence: Confidence = "manual"
 
@@ -20,10 +18,14 @@ class FamilyWarning(Table, frozen=True, kw_only=True):
 class Opening(Table, frozen=True, kw_only=True):
     """Waiting time with everything switched off, before opening or plugging."""
 
-    minutes: Annotated[int, Meta(ge=1)] | None = None
-    """Absent if no available document states it."""
-    below_volts: Annotated[int, Meta(ge=1)] | None = None
-    """Measured DC bus voltage below which the bus is considered discharged."""
+    minutes: Annotated[
+        Annotated[int, Meta(ge=1)] | None,
+        about("Absent if no available document states it."),
+    ] = None
+    below_volts: Annotated[
+        Annotated[int, Meta(ge=1)] | None,
+        about("Measured DC bus voltage below which the bus is considered discharged."),
+    ] = None
     note: str = ""
     source: str = ""
     confidence: Confidence = "manual"
@@ -33,7 +35,7 @@ class Lamp(Table, frozen=True, kw_only=True):
     """A lamp or display symbol, and its meaning."""
 
     name: str
-    tells: str
+    tells: Annotated[str, about("Meaning of the lamp.")]
     source: str = ""
     confidence: Confidence = "manual"
 
@@ -41,16 +43,19 @@ class Lamp(Table, frozen=True, kw_only=True):
 class SignalName(Table, frozen=True, kw_only=True):
     """A signal of the line and its names in other standards."""
 
-    signal: str
-    names: dict[str, str]
-    """Its names by standard."""
+    signal: Annotated[str, about("Name of the signal in this profile.")]
+    names: Annotated[dict[str, str], about("Its names by standard.")]
 
 
 class PortPolarization(Table, frozen=True, kw_only=True):
     """Polarization resistors that the drive itself can have."""
 
-    ohm: list[int]
-    """Possible resistances to 5 V and to the common, in ohm; 0 is none. The first is usual."""
+    ohm: Annotated[
+        list[int],
+        about(
+            "Possible resistances to 5 V and to the common, in ohm; 0 is none. The first is usual."
+        ),
+    ]
     note: str = ""
     source: str = ""
 
@@ -58,18 +63,17 @@ class PortPolarization(Table, frozen=True, kw_only=True):
 class Wiring(Table, frozen=True, kw_only=True):
     """Facts to know before touching the line or the drive."""
 
-    warnings: list[FamilyWarning] = []
-    """Facts that surprise, injure or damage."""
-    opening: Opening | None = None
-    """Waiting time before the drive is opened."""
-    signals: list[SignalName] = []
-    """Names of the line's signals in other standards."""
-    signals_source: str = ""
-    """Source of those names."""
-    lamps: list[Lamp] = []
-    """Lamps and display symbols."""
-    port: PortPolarization | None = None
-    """Polarization in the drive; absent if no document states it."""
+    warnings: Annotated[list[FamilyWarning], about("Facts that surprise, injure or damage.")] = []
+    opening: Annotated[Opening | None, about("Waiting time before the drive is opened.")] = None
+    signals: Annotated[
+        list[SignalName], about("Names of the line's signals in other standards.")
+    ] = []
+    signals_source: Annotated[str, about("Source of those names.")] = ""
+    lamps: Annotated[list[Lamp], about("Lamps and display symbols.")] = []
+    port: Annotated[
+        PortPolarization | None,
+        about("Polarization in the drive; absent if no document states it."),
+    ] = None
 
 
 class LineSchematic(Table, frozen=True, kw_only=True):
@@ -77,32 +81,39 @@ class LineSchematic(Table, frozen=True, kw_only=True):
 
     id: Identifier
     name: str
-    slaves: int
-    """Most slaves without a repeater."""
-    length_m: int
-    """Longest line at `length_baud`, in m."""
-    length_baud: int
-    tap_m: int
-    """Longest tap link, in m."""
-    shared_tap_m: int | None = None
-    """Length in m that the tap links of one junction box share, divided by their number."""
-    master_ohm: list[int] = []
-    """Least and most polarization at the master, in ohm."""
-    station_ohm: int = 0
-    """Polarization in every station, in ohm; 0 is none."""
-    total_ohm: list[int] = []
-    """Least and most of all polarization resistors in parallel, in ohm."""
-    best_ohm: int | None = None
-    """Recommended polarization of the whole line, in ohm."""
-    most_polarized: int | None = None
-    """Most stations with 4.7 kohm, if the master has `most_polarized_ohm`."""
-    most_polarized_ohm: int | None = None
-    terminator: Literal["RC", "R"]
-    """Terminator at both ends: RC is 120 ohm in series with 1 nF, R is 150 ohm."""
-    cable: str
-    """The cable in words."""
-    drawing: str = ""
-    """The schematic as text; it is shown unchanged."""
+    slaves: Annotated[int, about("Most slaves without a repeater.")]
+    length_m: Annotated[int, about("Longest line at `length_baud`, in m.")]
+    length_baud: Annotated[int, about("Baud rate in bit/s for which the length applies.")]
+    tap_m: Annotated[int, about("Longest tap link, in m.")]
+    shared_tap_m: Annotated[
+        int | None,
+        about("Length in m that the tap links of one junction box share, divided by their number."),
+    ] = None
+    master_ohm: Annotated[
+        list[int], about("Least and most polarization at the master, in ohm.")
+    ] = []
+    station_ohm: Annotated[int, about("Polarization in every station, in ohm; 0 is none.")] = 0
+    total_ohm: Annotated[
+        list[int],
+        about("Least and most of all polarization resistors in parallel, in ohm."),
+    ] = []
+    best_ohm: Annotated[
+        int | None, about("Recommended polarization of the whole line, in ohm.")
+    ] = None
+    most_polarized: Annotated[
+        int | None,
+        about("Most stations with 4.7 kohm, if the master has `most_polarized_ohm`."),
+    ] = None
+    most_polarized_ohm: Annotated[
+        int | None,
+        about("Polarization at the master in ohm for which that number applies."),
+    ] = None
+    terminator: Annotated[
+        Literal["RC", "R"],
+        about("Terminator at both ends: RC is 120 ohm in series with 1 nF, R is 150 ohm."),
+    ]
+    cable: Annotated[str, about("The cable in words.")]
+    drawing: Annotated[str, about("The schematic as text; it is shown unchanged.")] = ""
     source: str = ""
     confidence: Confidence = "manual"
 
@@ -110,20 +121,21 @@ class LineSchematic(Table, frozen=True, kw_only=True):
 class CablingPart(Table, frozen=True, kw_only=True):
     """A part for the line, by its catalog number."""
 
-    number: str
-    """Catalog number, with the spaces that its manufacturer prints."""
-    use: Literal["box", "terminator", "cable", "other"]
-    """Its place in the line."""
-    ends: list[Literal["RJ45", "stripped", "SUB-D"]] = []
-    """Ends of a cable, connection of a terminator, or sockets of a box for tap links."""
-    taps: int | None = None
-    """Tap links of a box."""
-    meters: DecimalText | None = None
-    """Length of a cable, or of the cable of a box."""
-    terminator: Literal["RC", "R"] | None = None
-    """Its terminator: RC is 120 ohm with 1 nF, R is 150 ohm."""
-    text: str
-    """Length, ends and what it is for."""
+    number: Annotated[str, about("Catalog number, with the spaces that its manufacturer prints.")]
+    use: Annotated[Literal["box", "terminator", "cable", "other"], about("Its place in the line.")]
+    ends: Annotated[
+        list[Literal["RJ45", "stripped", "SUB-D"]],
+        about("Ends of a cable, connection of a terminator, or sockets of a box for tap links."),
+    ] = []
+    taps: Annotated[int | None, about("Tap links of a box.")] = None
+    meters: Annotated[DecimalText | None, about("Length of a cable, or of the cable of a box.")] = (
+        None
+    )
+    terminator: Annotated[
+        Literal["RC", "R"] | None,
+        about("Its terminator: RC is 120 ohm with 1 nF, R is 150 ohm."),
+    ] = None
+    text: Annotated[str, about("Length, ends and what it is for.")]
     source: str = ""
     confidence: Confidence = "manual"
 
@@ -132,12 +144,9 @@ class CablingMaster(Table, frozen=True, kw_only=True):
     """The cable from a kind of master to the line, by the two ways to build a line."""
 
     name: str
-    rj45: str = ""
-    """Cable to splitter blocks and T-junction boxes for RJ45."""
-    boxes: str = ""
-    """Cable to junction boxes with screw terminals."""
-    sub_d: str = ""
-    """Cable to junction boxes with SUB-D sockets."""
+    rj45: Annotated[str, about("Cable to splitter blocks and T-junction boxes for RJ45.")] = ""
+    boxes: Annotated[str, about("Cable to junction boxes with screw terminals.")] = ""
+    sub_d: Annotated[str, about("Cable to junction boxes with SUB-D sockets.")] = ""
     source: str = ""
     confidence: Confidence = "manual"
 
@@ -145,9 +154,7 @@ class CablingMaster(Table, frozen=True, kw_only=True):
 class KeypadFunction(Table, frozen=True, kw_only=True):
     """A function of the keypad that has no address on the line."""
 
-    code: str
-    """Its name on the keypad."""
-    text: str
-    """Its purpose, values and factory setting."""
+    code: Annotated[str, about("Its name on the keypad.")]
+    text: Annotated[str, about("Its purpose, values and factory setting.")]
     source: str = ""
     confidence: Confidence = "manual"
