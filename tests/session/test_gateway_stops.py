@@ -7,6 +7,7 @@ import struct
 from collections.abc import AsyncIterator, Iterator
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import pytest
 import pytest_asyncio
@@ -85,16 +86,26 @@ async def test_stop_of_a_polling_client_is_sent_next(wire: Wire) -> None:
     assert wire.requests()[before:] == [STOP]
 
 
-async def test_stop_overtakes_waiting_reads(wire: Wire) -> None:
+async def test_stop_overtakes_waiting_reads(wire: Wire, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the moment when the line has it: before, both threads share a busy computer."""
+    write, given = wire.line.write, list[int]()
+
+    async def noting(*words: Any, **how: Any) -> Any:
+        given.append(len(wire.requests()))
+        return await write(*words, **how)
+
     await wire.known()
+    monkeypatch.setattr(wire.line, "write", noting)
     polls = [
         asyncio.create_task(wire.line.read(1, 3000 + number, priority=Priority.OPERATOR_READ))
         for number in range(50)
     ]
     await asyncio.sleep(0)
-    before = len(wire.requests())
+    begun = len(wire.requests())
     assert await wire.ask(STOP) == STOP
-    assert STOP in wire.requests()[before : before + 2]
+    requests, (before,) = wire.requests(), given
+    assert STOP in requests[before : before + 2]
+    assert [item for item in requests[begun:] if item[1] != 3000 >> 8] == [STOP]
     await asyncio.gather(*polls, return_exceptions=True)
 
 
