@@ -37,10 +37,25 @@ class Terminal:
         """Press keys, by tmux's names."""
         self.run("send-keys", *keys)
 
-    def answer(self, key: str) -> None:
-        """Press a key that answers a visible question, late enough to count."""
-        time.sleep(A_MOMENT)
-        self.press(key)
+    def answer(self, key: str, question: str = "") -> None:
+        """Press a key that answers a visible question, late enough to count.
+
+        With the words of the question, press it again if the panel has ignored it: it ignores a
+        key that a busy computer brings too late, as after a pause of the panel.
+        """
+        while True:
+            time.sleep(A_MOMENT)
+            self.press(key)
+            if not question:
+                return
+            wait_until(lambda: self._is_settled(question), f"an effect of {key}")
+            if question not in self.text():
+                return
+
+    def _is_settled(self, question: str) -> bool:
+        """True if a question is closed, or the panel reports that it has ignored a key."""
+        text = self.text()
+        return question not in text or "Ignored a key" in text or "Key ignored" in text
 
     def wait_for(self, *words: str) -> None:
         """Wait until all the words are on it."""

@@ -56,8 +56,9 @@ def test_next_panel_reports_the_motor_and_takes_it_over(
         terminal.wait_for("Taken over")
         assert frames(made.simulation) == before
         terminal.press("q")
-        terminal.wait_for("A motor is running on your command")
-        terminal.answer("s")
+        question = "A motor is running on your command"
+        terminal.wait_for(question)
+        terminal.answer("s", question)
         made.stopped()
         wait_until(lambda: not is_running(terminal.client()), "the second panel ended")
 
