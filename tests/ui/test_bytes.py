@@ -22,8 +22,9 @@ from textual.screen import ModalScreen, Screen
 from textual.strip import Strip
 from textual.widgets import Label
 
-from tui.terminal.lean import Picture, blank_style, strips_of
+from tui.terminal.lean import Picture, strips_of
 from tui.terminal.lean_app import ASK, WHOLE, LeanApp
+from tui.terminal.pen import blank_style
 from tui.widgets.lines import Lines, looks, piece_by_piece, runs
 
 from .bytes_per_second import compare

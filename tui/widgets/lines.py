@@ -14,7 +14,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from tui.drive.plain import plain
-from tui.terminal.lean import CURSOR_MOVE
+from tui.terminal.pen import CURSOR_MOVE
 
 
 class Lines(Widget):
