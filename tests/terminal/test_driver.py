@@ -15,7 +15,7 @@ from textual.driver import Driver
 from textual.message import Message
 
 from tui.terminal import driver as module
-from tui.terminal.driver import NO_REPORTS, with_own_keys
+from tui.terminal.driver import NO_COLOR, NO_REPORTS, with_own_keys
 from tui.terminal.reader import KeyReader
 from tui.terminal.stroke import Pressed
 
@@ -46,6 +46,9 @@ class Stops:
         return len(self.taken)
 
 
+LEAVE = "\x1b[?1049l"
+
+
 class OtherDriver(Driver):
     """A driver of another system, where Textual reads the keys."""
 
@@ -65,7 +68,8 @@ class OtherDriver(Driver):
 
     def disable_input(self) -> None: ...
 
-    def stop_application_mode(self) -> None: ...
+    def stop_application_mode(self) -> None:
+        self.write(LEAVE)
 
 
 def made(app: Stops, **settings: Any) -> Any:
@@ -73,6 +77,13 @@ def made(app: Stops, **settings: Any) -> Any:
         return with_own_keys(OtherDriver)(app, **settings)  # type: ignore[arg-type]
 
     return asyncio.run(make())
+
+
+def test_color_is_reset_once_before_the_screen_is_left() -> None:
+    driver = made(Stops())
+    for _ in range(2):
+        driver.stop_application_mode()
+    assert driver.written == [NO_COLOR, LEAVE, NO_REPORTS]
 
 
 QUERIES = ["\x1b[?25l", "\x1b[?1004h", "\x1b[>25u", "\x1b]22;text\x07", "\x1b[1;1Htext", "\x1b[<u"]

@@ -37,10 +37,14 @@ Cell = tuple[str, str]
 
 
 class Terminal:
-    """As much of a terminal as the panel's updates need: places, colors, characters."""
+    """As much of a terminal as the panel's updates need: places, colors, characters.
 
-    def __init__(self) -> None:
+    With `wide`, it draws lines in two cells, as terminals for East Asian languages can.
+    """
+
+    def __init__(self, *, wide: bool = False) -> None:
         self.cells: dict[tuple[int, int], Cell] = {}
+        self._wide = wide
         self._x, self._y, self._color = 0, 0, ""
         self._pen: dict[str, str] = {}
 
@@ -50,8 +54,15 @@ class Terminal:
             self._write(data[at : control.start()])
             at = control.end()
             if control[2] == "H":
-                row, column = control[1].split(";")
-                self._x, self._y = int(column) - 1, int(row) - 1
+                row, _, column = control[1].partition(";")
+                self._x, self._y = int(column or 1) - 1, int(row or 1) - 1
+            elif control[2] in "ABCD":
+                assert control[2] in "AB" or self._x < COLUMNS, "a terminal may stay at the last"
+                self._x += {"C": 1, "D": -1}.get(control[2], 0) * int(control[1] or 1)
+                self._y += {"B": 1, "A": -1}.get(control[2], 0) * int(control[1] or 1)
+            elif control[2] == "K":
+                for x in range(self._x, COLUMNS):
+                    self.cells[self._y, x] = (" ", self._color)
             elif control[2] == "m":
                 self._set_color(control[1])
             elif control[2] == "X":
@@ -78,8 +89,13 @@ class Terminal:
         for character in text:
             if character == "\n":
                 self._x, self._y = 0, self._y + 1
-            elif character != "\r":
-                width = get_character_cell_size(character)
+            elif character == "\r":
+                self._x = 0
+            elif character == "\b":
+                assert 0 < self._x < COLUMNS
+                self._x -= 1
+            else:
+                width = get_character_cell_size(character) * (1 + (self._wide and character == "─"))
                 if not width:
                     before, color = self.cells[self._y, self._x - 1]
                     self.cells[self._y, self._x - 1] = (before + character, color)
@@ -288,7 +304,7 @@ def test_partial_frames_add_up_to_the_same_screen(
 
 
 @pytest.mark.parametrize(
-    ("erases", "moves"), [(True, ["1;3"]), (False, ["1;3", "1;16", "1;31"])], ids=["erases", "not"]
+    ("erases", "moves"), [(True, [";3H"]), (False, [";3H", "12C", "14C"])], ids=["erases", "not"]
 )
 def test_dots_far_apart_are_erased_by_one_command(*, erases: bool, moves: list[str]) -> None:
     """Blanks between erased cells cost nothing, so the cursor does not have to jump over them."""
@@ -296,8 +312,60 @@ def test_dots_far_apart_are_erased_by_one_command(*, erases: bool, moves: list[s
     for text in ("| .            .              .", "|" + " " * 30):
         picture.want([(0, 0, Strip([Segment(text)]))], ColorSystem.TRUECOLOR)
         frame = picture.frame(WHOLE)
-    assert re.findall(r"\x1b\[(\d+;\d+)H", frame) == moves
-    assert frame.endswith("\x1b[29X" if erases else "H ")
+    assert re.findall(r"\x1b\[([\d;]*[HC])", frame) == moves
+    assert frame.endswith("\x1b[K" if erases else "C ")
+
+
+def shown_on(terminal: Terminal, picture: Picture, *rows: str) -> str:
+    strips = [(0, y, Strip([Segment(row)])) for y, row in enumerate(rows)]
+    picture.want(strips, ColorSystem.TRUECOLOR)
+    frame = picture.frame(WHOLE)
+    terminal.feed(frame)
+    return frame
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_rows_on_a_terminal_whose_cursor_others_move(seed: int) -> None:
+    """Each frame finds its first place although another program has written in between."""
+    import random
+
+    chance, terminal, picture = random.Random(seed), Terminal(), Picture(erases=True)
+    rows = [" " * COLUMNS] * ROWS
+    for _ in range(200):
+        for _ in range(chance.randrange(1, 5)):
+            y, x = chance.randrange(ROWS), chance.randrange(COLUMNS)
+            text = chance.choice(("1", "25.0", "⠤⠤", "─┐", "é", " " * COLUMNS))
+            rows[y] = (rows[y][:x] + text + rows[y][x + len(text) :])[:COLUMNS]
+        shown_on(terminal, picture, *rows)
+        assert terminal.text() == rows
+        terminal.feed(f"\x1b[{chance.randrange(ROWS) + 1};{chance.randrange(COLUMNS) + 1}H")
+
+
+def test_column_after_a_symbol_is_set_where_symbols_may_take_two_cells() -> None:
+    terminal, picture = Terminal(wide=True), Picture()
+    shown_on(terminal, picture, f"{'':>20}1")
+    shown_on(terminal, picture, f"─{'':>19}2")
+    assert terminal.cells[0, 20][0] == "2"
+
+
+def test_color_persists_until_the_contents_of_the_terminal_are_forgotten() -> None:
+    picture, red = Picture(), Style(color="#ff0000")
+    frames = []
+    for text in ("1", "2", "2"):
+        picture.want([(0, 0, Strip([Segment(text, red)]))], ColorSystem.TRUECOLOR)
+        frames.append(picture.frame(WHOLE))
+        if text == "2":
+            picture.forget()
+    assert frames == ["\x1b[H\x1b[0;38;2;255;0;0m1", "\x1b[H2", "\x1b[H\x1b[0;38;2;255;0;0m2"]
+
+
+def test_runs_of_one_color_are_written_together() -> None:
+    picture = Picture()
+    for digit in "12":
+        row = Text.assemble((digit, COLORS[0]), " " * 20, (digit, COLORS[1]))
+        picture.want([(0, y, strip_of(row)) for y in range(3)], ColorSystem.TRUECOLOR)
+        frame = picture.frame(WHOLE)
+    assert len(re.findall(r"\x1b\[[\d;]*m", frame)) == 1, "it begins with the last color"
 
 
 def test_frame_begins_with_the_status_bar_and_the_message() -> None:

@@ -136,6 +136,9 @@ ASK_FOR_FOCUS = "\x1b[?1004h"
 NO_REPORTS = "\x1b[?1000l\x1b[?1002l\x1b[?1003l\x1b[?1006l\x1b[?1004l"
 """Ends mouse reports that a crashed program left on: a click would type keys, even a Space."""
 
+NO_COLOR = "\x1b[0m"
+"""Resets the color, which persists between two pictures."""
+
 DROPPED_SEQUENCES = ("\x1b[>", "\x1b[<u", "\x1b]22;")
 """Sequences of Textual that are dropped: for the kitty keyboard protocol and the mouse pointer."""
 
@@ -200,6 +203,7 @@ def _giving_back(driver: type[Driver]) -> type[Driver]:
             with self._gate:
                 if self._left:
                     return
+                super().write(NO_COLOR)
                 super().stop_application_mode()
                 super().write(NO_REPORTS)  # only the main thread disables its input
                 self._left = True

@@ -20,10 +20,13 @@ from textual.strip import Strip
 
 from tui.drive.plain import commands
 
-from .pen import CURSOR_MOVE, Cell, Pen, blank_style, erasable
+from .pen import BLANK, CURSOR_MOVE, Cell, Pen, Run, blank_style, change, erasable, same_blank
 
 Placed = tuple[int, int, Strip]
 """A strip at a column and a row."""
+
+BATCH = 1000
+"""Bytes of runs that are sorted by color together; a terminal shows larger pictures row by row."""
 
 FIRST_ROWS, LAST_ROWS = 2, 2
 """Rows at the top (status bar, tabs) and at the bottom (message, key bar) that are drawn first."""
@@ -40,6 +43,7 @@ class Picture:
         self._wanted: dict[int, list[Cell | None]] = {}
         self._shown: dict[int, list[Cell | None]] = {}
         self._changed: dict[int, tuple[int, int]] = {}
+        self._pen = Pen(erases=erases)
 
     @property
     def is_shown(self) -> bool:
@@ -50,6 +54,7 @@ class Picture:
         """Assume nothing about the terminal's contents: another program may have written to it."""
         self._shown.clear()
         self._changed = {y: (0, len(row)) for y, row in self._wanted.items()}
+        self._pen.forget_color()
 
     def clear(self) -> None:
         """Start again after a change of the terminal's size."""
@@ -67,32 +72,53 @@ class Picture:
             first, last = self._changed.get(y, (x, end))
             self._changed[y] = min(first, x), max(last, end)
 
-    def frame(self, room: int) -> str:
+    def frame(self, room: int, cursor: tuple[int, int] | None = None) -> str:
         """Return the output for the terminal, and count it as shown.
 
-        It ends with the row in which it exceeds `room` bytes. The first and the last rows come
-        first, then the others from the top.
+        It has about `room` bytes, and at least a row. The first and the last rows come first, then
+        the others from the top. Their runs are sorted by color in batches, since a color takes more
+        bytes than a movement. At its end, the terminal's cursor is at this column and row.
         """
-        pen = Pen(erases=self._erases)
-        for y in self._in_order():
-            if pen.size > room:
-                break
-            self._draw(pen, y)
-        return pen.text()
+        pen, waiting = self._pen, self._in_order()
+        while waiting and pen.size <= room:
+            batch: list[Run] = []
+            size = pen.size
+            while waiting and size <= min(room, pen.size + BATCH):
+                found = self._take(waiting.pop())
+                size += sum(map(_size_of, found))
+                batch += found
+            pen.write_all(batch)
+        return pen.take(cursor)
 
     def _in_order(self) -> list[int]:
+        """The changed rows, the first one last."""
         bottom = max(self._wanted, default=0) - LAST_ROWS
-        return sorted(self._changed, key=lambda y: (FIRST_ROWS <= y <= bottom, y))
+        return sorted(self._changed, key=lambda y: (FIRST_ROWS <= y <= bottom, y), reverse=True)
 
-    def _draw(self, pen: Pen, y: int) -> None:
-        """Write the differing cells of a row."""
+    def _take(self, y: int) -> list[Run]:
+        """Count a row as shown, and return its differing cells."""
         first, last = self._changed.pop(y)
         wanted = self._wanted[y]
         shown = self._shown.setdefault(y, [])
         shown.extend([None] * (len(wanted) - len(shown)))
-        for start, end in different(shown, wanted, first, last, erases=self._erases):
-            pen.write(start, y, wanted[start:end])
+        found: list[Run] = [
+            (start, y, wanted[start:end], len(wanted))
+            for start, end in different(shown, wanted, first, last, erases=self._erases)
+        ]
         shown[first:last] = wanted[first:last]
+        return found
+
+
+def _size_of(run: Run) -> int:
+    """Bytes that a run takes at most, roughly."""
+    size, before = CURSOR_MOVE, None
+    for cell in run[2]:
+        text, ansi = cell or BLANK
+        size += 1 if text.isascii() else len(text.encode())
+        if ansi != before:
+            size += len(ansi) + len("\x1b[22;m")
+        before = ansi
+    return size
 
 
 def different(
@@ -109,23 +135,42 @@ def different(
     nothing: one command erases them all.
     """
     found: list[tuple[int, int]] = []
+    if shown[first:last] == wanted[first:last]:
+        return found
     if shown[first:last].count(None) == last - first and None not in wanted[first:last]:
-        return [(first, last)] if first < last else found  # the first picture: nothing is equal
+        return [(first, last)]  # the first picture: nothing is equal
     for place in range(first, last):
         cell = wanted[place]
         if cell is None or shown[place] == cell:
             continue
         start = place if cell[0] else max(0, place - 1)
-        gap = wanted[found[-1][1] : start] if found else ()
+        end = found[-1][1] if found else None
         erased = erases and cell[0] == " " and erasable(cell[1])
-        is_near = len(gap) < CURSOR_MOVE and None not in gap
-        if found and (
-            is_near or (erased and all(same == cell for same in wanted[found[-1][1] - 1 : start]))
+        if end is not None and (
+            is_shorter_than_move(wanted, end, start)
+            or (erased and all(same == cell for same in wanted[end - 1 : start]))
         ):
             found[-1] = (found[-1][0], place + 1)
         else:
             found.append((start, place + 1))
     return found
+
+
+def is_shorter_than_move(row: Sequence[Cell | None], end: int, start: int) -> bool:
+    """Return True if writing the cells from `end` to `start` takes fewer bytes than a jump."""
+    gap = row[end:start]
+    if len(gap) >= CURSOR_MOVE or None in gap:
+        return False
+    size, before = 0, (row[end - 1] or BLANK)[1]
+    direct = len(change(before, (row[start] or BLANK)[1]))
+    for cell in row[end : start + 1]:
+        text, ansi = cell or BLANK
+        size += 1 if text.isascii() else len(text.encode())
+        if ansi != before and (text != " " or not same_blank(before, ansi)):
+            size += len(change(before, ansi))
+            before = ansi
+    text, _ = row[start] or BLANK
+    return size - len(text.encode()) <= direct + len(f"\x1b[{start - end}C")
 
 
 def screen_text(screen: Screen[Any]) -> str:

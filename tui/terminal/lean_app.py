@@ -18,12 +18,12 @@ from typing import Any, Final
 
 from rich.color import ColorSystem
 from rich.console import RenderableType
-from rich.control import Control
 from textual.app import App
 from textual.filter import LineFilter, Monochrome
 from textual.screen import Screen
 
 from .abilities import EVERYTHING, UTF_8, Abilities
+from .fields import takes_text
 from .lean import Picture, strips_of
 
 ASK: Final = "\x1b[6n"
@@ -235,7 +235,7 @@ class LeanApp(App[None]):
         hurry = now < self._hurries_until
         while room := self._pacing.room(now, hurry=hurry, rest=self._begun):
             first = hurry and room < WHOLE and not self._begun
-            if frame := self._picture.frame(FIRST_PIECE if first else room):
+            if frame := self._picture.frame(FIRST_PIECE if first else room, self._cursor()):
                 self._write(frame, now)
             self._begun = not self._picture.is_shown
             if not self._begun:
@@ -248,14 +248,18 @@ class LeanApp(App[None]):
     def _write(self, frame: str, now: float) -> None:
         assert self._driver is not None
         if frame:
-            at = self.screen.outer_size.clamp_offset(self.cursor_position)
-            frame += Control.move_to(*at).segment.text
             self._begin_update()
             self._driver.write(frame)
             self._end_update()
         self._driver.write(ASK)
         self._driver.flush()
         self._pacing.sent(len(frame), now)
+
+    def _cursor(self) -> tuple[int, int]:
+        """The place of the terminal's hidden cursor: in a text field, for input methods."""
+        if not takes_text(self.focused):
+            return 0, 0
+        return self.screen.outer_size.clamp_offset(self.cursor_position)
 
     def _look_later(self, now: float) -> None:
         """Try again later: if the terminal does not answer, nothing else sends the rest."""

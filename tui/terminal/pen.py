@@ -46,25 +46,30 @@ def cell_style(ansi: str) -> CellStyle:
     return CellStyle(frozenset(attributes), **colors)
 
 
+def from_reset(style: str) -> str:
+    """The sequence from any style to this one."""
+    return f"\x1b[{RESET};{style}m" if style else f"\x1b[{RESET}m"
+
+
 @lru_cache(maxsize=4096)
 def change(before: str, after: str) -> str:
     """The shortest sequence from one style to another; empty if they are the same."""
     if before == after:
         return ""
     was, now = cell_style(before), cell_style(after)
-    from_reset = f"\x1b[{RESET};{after}m" if after else f"\x1b[{RESET}m"
+    reset = from_reset(after)
     dropped = was.attributes - now.attributes
     default_color = (was.foreground and not now.foreground) or (
         was.background and not now.background
     )
     if default_color or not dropped <= {"1"}:
-        return from_reset
+        return reset
     added = [NOT_BOLD] if dropped else []
     kept = was.attributes - {"2"} if dropped else was.attributes  # NOT_BOLD ends dim, too
     added += sorted(now.attributes - kept)
     added += [now.foreground] if now.foreground != was.foreground else []
     added += [now.background] if now.background != was.background else []
-    return min(f"\x1b[{';'.join(added)}m" if added else "", from_reset, key=len)
+    return min(f"\x1b[{';'.join(added)}m" if added else "", reset, key=len)
 
 
 def erasable(ansi: str) -> bool:
@@ -86,61 +91,139 @@ def same_blank(before: str, after: str) -> bool:
 Cell = tuple[str, str]
 """A character and its colors; an empty character if the one to the left is two cells wide."""
 
-CURSOR_MOVE = 8
-"""Bytes of a cursor movement: a shorter run of unchanged cells is sent again instead."""
+BLANK: Cell = (" ", "")
 
-ERASE = 5
-"""Bytes of an erase command."""
+Run = tuple[int, int, Sequence["Cell | None"], int]
+"""Column, row, cells, and the number of cells of the row."""
+
+CURSOR_MOVE = 8
+"""Bytes of the longest usual cursor movement; unchanged cells that take no more are sent again."""
+
+ERASE_REST = 3
+"""Bytes of the command that erases the rest of a row."""
 
 
 class Pen:
     """Writes cells; moves the cursor and changes the color only if necessary.
 
-    `erases`: the terminal erases cells in the current color.
+    The color persists from one output to the next. The position does not, since another program may
+    write to the terminal in between. `erases`: the terminal erases cells in the current color.
     """
 
     def __init__(self, *, erases: bool = False) -> None:
         self._erases = erases
         self._parts: list[str] = []
-        self._at: tuple[int, int] | None = None
-        self._ansi = ""
+        self._row: int | None = None
+        self._column: int | None = None
+        """None if the terminal may be at another column: see `has_known_width`."""
+        self._ansi: str | None = None
         self.size = 0
         """Characters written so far; nearly all of them take one byte."""
 
-    def write(self, x: int, y: int, cells: Sequence[Cell | None]) -> None:
-        """Write cells from this column and row on."""
-        if self._at != (x, y):
-            self._put(f"\x1b[{y + 1};{x + 1}H")
-        place, moved = 0, True
-        while place < len(cells):
-            text, ansi = cells[place] or (" ", "")
-            if not moved:
-                self._put(f"\x1b[{y + 1};{x + place + 1}H")
-            if ansi != self._ansi and (text != " " or not same_blank(self._ansi, ansi)):
-                self._put(change(self._ansi, ansi))
-                self._ansi = ansi
-            blank = self._blank(cells, place) if text == " " else 0
-            self._put(f"\x1b[{blank}X" if blank else text)
-            place, moved = place + (blank or 1), not blank
-        self._at = (x + len(cells), y) if moved else None
+    def forget_color(self) -> None:
+        """Assume nothing about the color that the terminal writes in."""
+        self._ansi = None
 
-    def _blank(self, cells: Sequence[Cell | None], place: int) -> int:
-        """Return the number of blanks from `place` on that are erased rather than written."""
+    def write_all(self, runs: Sequence[Run]) -> None:
+        """Write runs of cells, those of the present color first, then color by color."""
+        order = {self._ansi: -1}
+        for number, run in enumerate(runs):
+            order.setdefault(_color_of(run), number)
+        for run in sorted(runs, key=lambda run: order[_color_of(run)]):
+            self._write(*run)
+
+    def take(self, cursor: tuple[int, int] | None = None) -> str:
+        """Return the output since the last call; it ends with the cursor at a column and row."""
+        if cursor is not None and self._parts:
+            self._put(move_to(*cursor))
+        text = "".join(self._parts)
+        self._parts.clear()
+        self._row = self._column = None
+        self.size = 0
+        return text
+
+    def _write(self, x: int, y: int, cells: Sequence[Cell | None], width: int) -> None:
+        """Write cells from this column and row on, in a row of `width` cells."""
+        self._move(x, y)
+        place = 0
+        while place < len(cells):
+            text, ansi = cells[place] or BLANK
+            if ansi != self._ansi and (
+                text != " " or self._ansi is None or not same_blank(self._ansi, ansi)
+            ):
+                self._put(from_reset(ansi) if self._ansi is None else change(self._ansi, ansi))
+                self._ansi = ansi
+            blank = self._blanks(cells, place) if text == " " else 0
+            if blank > ERASE_REST and x + place + blank == width:
+                self._put("\x1b[K")
+                return
+            if blank > CURSOR_MOVE + len(f"\x1b[{blank}X"):
+                self._put(f"\x1b[{blank}X")
+                place += blank
+                if place < len(cells):
+                    self._move(x + place, y)
+                continue
+            self._put(text)
+            place += 1
+            self._column = x + place if self._column is not None and has_known_width(text) else None
+        if x + place >= width:
+            self._column = None  # the terminal stays at the last column, or after it
+
+    def _blanks(self, cells: Sequence[Cell | None], place: int) -> int:
+        """Return the number of equal blanks from `place` on that may be erased instead."""
         cell = cells[place]
         if not self._erases or cell is None or not erasable(cell[1]):
             return 0
         end = place
         while end < len(cells) and cells[end] == cell:
             end += 1
-        return end - place if end - place > CURSOR_MOVE + ERASE else 0
+        return end - place
+
+    def _move(self, x: int, y: int) -> None:
+        """Move the cursor by the shortest sequence that every terminal since the VT100 knows."""
+        known = [move_to(x, y)]
+        if self._row is not None:
+            rows = move_by(y - self._row, "B", "A")
+            known.append(f"{rows}\r{move_by(x, 'C', 'D')}")
+            if self._column is not None:
+                back = self._column - x
+                known.append(f"{rows}{move_by(-back, 'C', 'D')}")
+                known += [f"{rows}{BACKSPACE * back}"] if 0 < back < CURSOR_MOVE else []
+        self._put(min(known, key=len))
+        self._row, self._column = y, x
 
     def _put(self, text: str) -> None:
         self._parts.append(text)
         self.size += len(text)
 
-    def text(self) -> str:
-        """All output, ending with the colors reset."""
-        if self._ansi:
-            self._put("\x1b[0m")
-            self._ansi = ""
-        return "".join(self._parts)
+
+BACKSPACE = "\b"
+
+
+def move_to(x: int, y: int) -> str:
+    """The sequence to this column and row; the terminal takes 1 for an omitted number."""
+    row = f"{y + 1}" if y else ""
+    return f"\x1b[{row};{x + 1}H" if x else f"\x1b[{row}H"
+
+
+def move_by(count: int, forward: str, back: str) -> str:
+    """The sequence for so many cells forward, or back if negative."""
+    if not count:
+        return ""
+    number = abs(count) if abs(count) > 1 else ""
+    return f"\x1b[{number}{forward if count > 0 else back}"
+
+
+def has_known_width(text: str) -> bool:
+    """Return True if every terminal draws a character in one cell.
+
+    Terminals for East Asian languages draw symbols, lines and arrows in two cells if so set. After
+    one of those, the column is set again instead of being counted.
+    """
+    return text.isascii() or "\u2800" <= text <= "\u28ff"
+
+
+def _color_of(run: Run) -> str:
+    """The first color of a run that must be set."""
+    cells = [cell or BLANK for cell in run[2]]
+    return next((ansi for text, ansi in cells if text != " " or not erasable(ansi)), cells[0][1])
