@@ -25,6 +25,7 @@ from tui.terminal.last_words import LastWords
 from tui.widgets.drawing import short
 from tui.widgets.palette import THEME
 
+from .screens.frame import FRAME_LOOK
 from .screens.key_dispatcher import KeyDispatcher
 from .screens.last_stops import LastStops
 from .screens.leaving import Leaving
@@ -32,7 +33,7 @@ from .screens.line_check import LineCheck
 from .screens.line_owner import LineOwner, Opener
 from .screens.open_lines import LineOpening
 from .screens.replay_keys import ReplayKeys
-from .screens.status_refresher import FRAME_LOOK, StatusRefresher
+from .screens.status_refresher import StatusRefresher
 
 if TYPE_CHECKING:
     from tui.session.bundle.subject import DriveDocuments

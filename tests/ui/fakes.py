@@ -27,7 +27,7 @@ from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
-from tui.screens.status_refresher import FRAME_LOOK
+from tui.screens.frame import FRAME_LOOK
 from tui.session.arming import Arming
 from tui.session.clock import Clock
 from tui.session.connect.identify import DriveIdentity

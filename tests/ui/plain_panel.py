@@ -14,7 +14,7 @@ from textual.containers import Horizontal
 from textual.widgets import DataTable, Digits, Footer, Sparkline
 
 from tui.drive.profile import library
-from tui.screens.monitor.screen import REFRESH
+from tui.screens.frame import FRAME_LOOK
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor
@@ -55,7 +55,7 @@ class PlainPanel(App[None]):
             row = (parameter.code, parameter.name, "-----", parameter.unit, "")
             table.add_row(*row, key=parameter.code)
         self._monitor.start()
-        self.set_interval(REFRESH, self.look)
+        self.set_interval(FRAME_LOOK, self.look)
 
     def look(self) -> None:
         """Set everything from the latest snapshot."""

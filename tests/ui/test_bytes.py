@@ -22,12 +22,15 @@ from textual.screen import ModalScreen, Screen
 from textual.strip import Strip
 from textual.widgets import Label
 
+from tui.app import DrivePanelApp
+from tui.screens.frame import FRAME_LOOK
 from tui.terminal.lean import Picture, strips_of
 from tui.terminal.lean_app import ASK, WHOLE, LeanApp
 from tui.terminal.pen import blank_style
 from tui.widgets.lines import Lines, looks, piece_by_piece, runs
 
 from .bytes_per_second import compare
+from .fakes import NOW, StillClock
 
 pytestmark = pytest.mark.drawn
 
@@ -423,6 +426,28 @@ async def test_unread_output_is_dropped_for_the_newest() -> None:
         assert "six" in then
         assert "two" not in then
         assert app.answer() == ""
+
+
+async def test_screen_is_refreshed_at_its_pace_right_after_the_frame(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Both in one output; not on a slow link, where the refresh of the frame is rare."""
+    app, calls = DrivePanelApp(), []
+    async with app.run_test() as pilot:
+        screen: Any = app.connection
+        monkeypatch.setattr(type(screen), "LOOK", 0.5)
+        monkeypatch.setattr(screen, "draw_frame", lambda _: calls.append("frame"))
+        monkeypatch.setattr(screen, "look", lambda: calls.append("look"))
+        app.panel_clock = clock = StillClock()
+        for tick in range(4):
+            monkeypatch.setattr(clock, "monotonic", lambda at=NOW + tick * FRAME_LOOK: at)
+            app.look_around()
+        assert calls == ["frame", "look", "frame"] * 2
+        app.low_bandwidth = True
+        calls.clear()
+        screen.look_in_time()
+        assert not calls
+        await pilot.pause()
 
 
 async def test_output_of_a_key_is_sent_immediately() -> None:

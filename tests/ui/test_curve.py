@@ -354,12 +354,33 @@ def test_low_bandwidth_refresh_at_rest_changes_only_the_curve() -> None:
     assert curve_lines(early, room)[-2:] == curve_lines(late, room)[-2:]
 
 
+def test_axis_grows_with_the_curve_and_to_now_without_new_values() -> None:
+    """Otherwise each of them would be sent with a color and places of its own."""
+    room, view = arrange(80, 24, 9), running_view(1000.0, 30.0)
+    ends = {
+        late: curve_lines(replace(view, now=1000.0 + late), room)[-2].plain.rstrip()
+        for late in (0.0, 0.4, 2.0)
+    }
+    assert ends[0.0] == ends[0.4]
+    assert ends[2.0].count("─") == ends[0.0].count("─") + 2
+
+
 def test_low_bandwidth_link_gets_no_grid() -> None:
     room, view = arrange(80, 24, 9), running_view(1000.0, 30.0)
     slow = replace(view, lean=True)
     dots = [sum(line.plain.count("·") for line in curve_lines(v, room)) for v in (view, slow)]
     assert dots[0] > 50
     assert dots[1] == 0
+
+
+def test_low_bandwidth_link_gets_marks_on_the_axis_only() -> None:
+    room, base = arrange(80, 24, 9, lean=True), running_view(1000.0, 30.0)
+    trend = [*base.trend[:-1], replace(base.trend[-1], mark="trip")]
+    drawn = {}
+    for lean in (False, True):
+        rows = curve_lines(replace(base, trend=tuple(trend), lean=lean), room)
+        drawn[lean] = [sum(sign in row.plain for row in rows) for sign in ("┆", "■ trip")]
+    assert drawn == {False: [room.plot - 2, 1], True: [0, 1]}
 
 
 def test_no_axis_is_drawn_before_the_first_value() -> None:

@@ -273,14 +273,14 @@ async def test_only_changed_rows_are_drawn() -> None:
 
 
 @pytest.mark.parametrize("size", kept([(80, 24), (120, 40)], (80, 24)))
-async def test_selecting_another_bit_word_draws_that_alone(size: tuple[int, int]) -> None:
+async def test_selecting_another_bit_word_draws_that_alone(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=size) as pilot:
         screen = await to_monitor(app, pilot, 2)
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
-        for text in ("_timer", "_still"):
-            if timer := getattr(screen, text):
-                timer.pause()
+        monkeypatch.setattr(screen, "look_in_time", lambda: None)
         words, motor = screen.query_one("#curve", Lines), screen.query_one("#motor", Lines)
         before = words.lines
         motor.show([Text("as it was")])

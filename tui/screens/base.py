@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
@@ -15,7 +16,7 @@ from tui.terminal.fields import takes_space, takes_text
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
-from .frame import Framed
+from .frame import FRAME_LOOK, Framed
 from .keys.table import elsewhere, keys_line, opening_line, typing_line
 
 
@@ -33,6 +34,7 @@ class PanelScreen(Framed):
     """
     LOOK: ClassVar[float | None] = None
     """Seconds between two refreshes; None if the screen refreshes at its own times."""
+    _looked_at = -math.inf
 
     def compose(self) -> ComposeResult:
         """The frame, the body of the screen, and the key bar."""
@@ -45,10 +47,14 @@ class PanelScreen(Framed):
         """Compose the part between the tabs and the message."""
         raise NotImplementedError
 
-    def on_mount(self) -> None:
-        """Start the regular refresh; on a low-bandwidth link the refresh of the frame does it."""
-        if self.LOOK is not None and not self.app.low_bandwidth:
-            self.set_interval(self.LOOK, self.look)
+    def look_in_time(self) -> None:
+        """Refresh if it is due; on a low-bandwidth link the refresh of the frame does it."""
+        if self.LOOK is None or self.app.low_bandwidth:
+            return
+        now = self.app.panel_clock.monotonic()
+        if now > self._looked_at + self.LOOK - FRAME_LOOK / 2:
+            self._looked_at = now
+            self.look()
 
     def on_resize(self, event: Resize) -> None:
         """Refresh for the new size."""

@@ -47,6 +47,8 @@ MESSAGE_KIND_STYLES: dict[str, Style] = {
     "working": ATTENTION,
     "done": PLAIN,
 }
+FRAME_LOOK = 0.25
+"""Seconds between two updates of the frame, and of the screen within it."""
 SELDOM = 2.0
 """Seconds between two updates on a slow link; state, stop and fault are shown immediately."""
 WHOLE_KINDS = frozenset({"fault", "failed", "error", "refused", "alarm", "told", "done"})
@@ -159,6 +161,9 @@ class Framed(Screen[Any]):
 
     def look(self) -> None:
         """Show the present contents within the frame; a dialog has none that change."""
+
+    def look_in_time(self) -> None:
+        """Show them if that is due, right after the frame: so both are in one output."""
 
     def draw_frame(self, view: FrameView) -> None:
         """Show the frame's present contents; unchanged parts are not drawn."""

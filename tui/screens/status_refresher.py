@@ -14,8 +14,8 @@ from .frame_source import FrameSource
 if TYPE_CHECKING:
     from tui.session.console import DriveConsole
 
-FRAME_LOOK, HEALTH_LOOK = 0.25, 1.0
-"""Seconds between two updates of the frame, and between two checks of the lines' last minute."""
+HEALTH_LOOK = 1.0
+"""Seconds between two checks of the lines' last minute."""
 
 WHAT_TO_DO = "Open it, then press Space to stop it or T to take it over."
 
@@ -61,6 +61,8 @@ class StatusRefresher(Panel):
             self.notify(trouble, severity="error")
         self._journal_trouble = trouble
         self.draw_frame()
+        if isinstance(self.screen, Framed) and self.screen.is_mounted:
+            self.screen.look_in_time()
 
     def frame_now(self) -> FrameView:
         """Return the frame around every screen at this moment."""

@@ -126,7 +126,8 @@ def _band_lines(page: ShownPage, band: Band, rows: int) -> list[Text]:
         plot,
         reach_of(view),
         ticks=tuple(column for column, _ in ticks_of(page)),
-        marks=tuple(page.marks),
+        # their signs on the axis remain: a line in each row would be sent at each turn of the page
+        marks=() if view.lean else tuple(page.marks),
         cursor=None if view.cursor is None else plot.column(view.cursor),
     )
     labels = {plot.row(value): value for value in plot.scale.labels}

@@ -39,6 +39,9 @@ from .time_cursor import CursorKeys, TimeCursor
 from .view import View
 
 if TYPE_CHECKING:
+    from tui.bus.model import LineCounters
+    from tui.session.monitor.snapshot import Snapshot
+
     from ..app_port import Panel
 
 
@@ -63,8 +66,6 @@ def works_now(view: View, action: str) -> bool:
     return view.control.hindrance is None or action == "run_line('reference')"
 
 
-REFRESH = 0.25
-"""Seconds between two checks of the latest snapshot; the line polls at its own rate."""
 FROZEN_AFTER = 5.0
 """Seconds under a dialog after which the values below it are reported as frozen."""
 STOP_SHOWN_FOR = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
@@ -89,7 +90,6 @@ class MonitorScreen(CursorKeys):
         self.session = console.session
         self._source: ViewSource | None = None
         self._words = watched_words(self.session.profile)
-        self._timer: Timer | None = None
         self._still: Timer | None = None
         self._reported: object = None
         """Urgent parts of the snapshot that was shown last."""
@@ -107,7 +107,7 @@ class MonitorScreen(CursorKeys):
         yield Lines(id="message")
 
     def on_mount(self) -> None:
-        """Start polling the drive and refreshing the screen."""
+        """Start polling the drive."""
         if self.app.replay is None or not self.console.monitor.started:
             beside = codes_beside(self.session.profile)
             self.console.monitor.start(period=self.app.period, extra=beside)
@@ -115,9 +115,8 @@ class MonitorScreen(CursorKeys):
                 from tui.session.replay import open_past
 
                 open_past(self.app.replay, self.console)
-        self._timer = self.set_interval(REFRESH, self._look_in_time)
 
-    def _look_in_time(self) -> None:
+    def look_in_time(self) -> None:
         """Refresh the screen; on a low-bandwidth link figures wait for the refresh of the frame.
 
         A new state, fault or error, and additional values, are shown immediately.
@@ -152,14 +151,12 @@ class MonitorScreen(CursorKeys):
             self._place(self._room())
 
     def on_screen_suspend(self) -> None:
-        """Pause the refresh while another screen is on top.
+        """Mark the values as frozen after some time: only the screen on top is refreshed.
 
         A change below a screen makes Textual draw the whole terminal again.
         """
-        if self._timer is not None:
-            self._timer.pause()
-            since = self.app.clock.time_of_day()
-            self._still = self.set_timer(FROZEN_AFTER, lambda: self._tell_still(since))
+        since = self.app.clock.time_of_day()
+        self._still = self.set_timer(FROZEN_AFTER, lambda: self._tell_still(since))
 
     def _tell_still(self, since: str) -> None:
         """Mark the values that are visible under a dialog with the time at which they froze."""
@@ -170,11 +167,9 @@ class MonitorScreen(CursorKeys):
             self.put("state", [*[Text("")] * room.lead, *box])
 
     def on_screen_resume(self, event: ScreenResume) -> None:
-        """Resume the refresh after another screen was on top."""
+        """Refresh after another screen was on top."""
         if self._still is not None:
             self._still.stop()
-        if self._timer is not None:
-            self._timer.resume()
         self.call_after_refresh(self.look)
 
     def draw_frame(self, view: FrameView) -> None:
@@ -287,6 +282,14 @@ class ViewSource:
     def __init__(self, app: Panel, console: DriveConsole) -> None:
         self._app = app
         self._console = console
+        self._counted: tuple[Snapshot | None, float, LineCounters] | None = None
+        """The counters of the line, with the time and the latest snapshot then."""
+
+    def _counters(self, snapshot: Snapshot | None, now: float) -> LineCounters:
+        """Return the counters, 1 s old at most; they change with the snapshot, in one output."""
+        if self._counted is None or self._counted[0] is not snapshot or now >= self._counted[1] + 1:
+            self._counted = snapshot, now, self._console.session.line.counters
+        return self._counted[2]
 
     def view(self, control: Control, word: int | None, cursor: TimeCursor) -> View:
         """Return the present contents; `word` is the index of a table, None for the curve."""
@@ -298,7 +301,7 @@ class ViewSource:
             snapshot=snapshot,
             line=session.line.state,
             device=session.device,
-            counters=session.line.counters,
+            counters=self._counters(snapshot, now),
             trend=monitor.trend,
             period=monitor.period,
             now=now,

@@ -139,13 +139,14 @@ def mark_names(page: ShownPage, *, on_axis: bool) -> dict[TrendMark, MarkName]:
 
 
 def axis_lines(page: ShownPage, rows: int, names: Mapping[TrendMark, MarkName]) -> list[Text]:
-    """Return the time axis up to now with its marks, and the clock times below or on it.
+    """Return the time axis up to its end with its marks, and the clock times below or on it.
 
     On a low-bandwidth link the axis is complete: its end would move with each refresh.
     """
     view, columns, plot = page.view, page.columns, page.plot(1, CurveScale(0, 1))
     ticks = ticks_of(page)
-    reached = plot.column(view.now) if view.now < plot.end and not view.lean else columns
+    end_time = axis_end(view)
+    reached = plot.column(end_time) if end_time < plot.end and not view.lean else columns
     reached = -1 if reached is None else reached
     cells = [("─" if column <= reached else " ", FAINT) for column in range(columns)]
     end = max((name.column + len(name.text) for name in names.values()), default=0)
@@ -172,6 +173,15 @@ def axis_lines(page: ShownPage, rows: int, names: Mapping[TrendMark, MarkName]) 
         return [_with_cause(page, axis)]
     below = Text(" " * (LABEL_CELLS + 1), no_wrap=True).append(times, FAINT)
     return [axis, _with_cause(page, below)]
+
+
+def axis_end(view: View) -> float:
+    """Return the time up to which the axis is drawn: of the newest value, or now if that is old.
+
+    So the axis and the curve grow in one output.
+    """
+    newest = view.trend[-1].time if view.trend else -math.inf
+    return newest if view.now - newest < AXIS_BEHIND else view.now
 
 
 def _with_cause(page: ShownPage, line: Text) -> Text:
@@ -208,6 +218,8 @@ def _cause(page: ShownPage, column: int) -> str:
     return f"{name} of {settings} by {by}"
 
 
+AXIS_BEHIND = 0.5
+"""Seconds that the axis may end before now."""
 FULL_CELLS = 10
 """Least columns between two ticks for clock times in full."""
 
