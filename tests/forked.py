@@ -181,6 +181,11 @@ class Forks:
     """A process that has collected all tests of a copy, and forks for each request."""
 
     def __init__(self, copy: Path, collected: Sequence[str] = ()) -> None:
+        self._copy, self._chosen = copy, collected
+        self._begin()
+
+    def _begin(self) -> None:
+        copy, collected = self._copy, self._chosen
         requests, self._requests = os.pipe()
         self._results, results = os.pipe()
         environment = {
@@ -202,13 +207,21 @@ class Forks:
         self, tests: Sequence[str], path: str = "", before: str = "", after: str = "",
         seconds: float = LONGEST,
     ) -> Result:  # fmt: skip
-        """Run tests in a fork until one fails, with a source of a file instead of another."""
+        """Run tests in a fork until one fails, with a source of a file instead of another.
+
+        If that ends the process that forks, which a defect can do, another one begins, and no test
+        counts as failed.
+        """
         request = {
             "tests": tests, "path": path, "before": before, "after": after, "seconds": seconds,
         }  # fmt: skip
         self._await_ready()
         os.write(self._requests, json.dumps(request).encode() + b"\n")
-        return Result(*json.loads(self._lines.readline()))
+        if answer := self._lines.readline():
+            return Result(*json.loads(answer))
+        self.close()
+        self._begin()
+        return Result("")
 
     def _await_ready(self) -> None:
         """Wait until the tests are collected; several processes may begin at the same time."""

@@ -114,7 +114,8 @@ def record(copy: Path, commit: str, tests: Sequence[str], jobs: int) -> Record:
     from coverage import CoverageData
 
     parts = folder() / f"{commit}.parts"
-    parts.mkdir(parents=True, exist_ok=True)
+    shutil.rmtree(parts, ignore_errors=True)  # of a run that was ended: of another copy
+    parts.mkdir(parents=True)
     environment = {**os.environ, "PYTHONPATH": str(copy), PARTS: str(parts)}
     command = [sys.executable, *PYTEST, "-n", str(jobs), "--dist", "worksteal", *tests]
     command += ["-m", ""] if any(test.endswith(".py") for test in tests) else []

@@ -1,7 +1,8 @@
 """Results as text, and the texts that tests compare with: sections of a file beside the test.
 
-After an intended change, `python -m tests.recorded` writes these files again. Read the
-differences before you commit them: a person will see them.
+After an intended change, `python -m tests.recorded` writes these files again; with a word, only
+those of modules with it in their names. Read the differences before you commit them: a person will
+see them.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import os
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -68,8 +70,8 @@ def short(found: object) -> str:
 
 RECORDED = (
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
-    "session.test_recorded_texts", "ui.test_recorded_drawings", "cli.test_recorded_refusals",
-    "cli.test_recorded_outputs", "test_tables",
+    "session.test_recorded_texts", "ui.test_recorded_drawings", "ui.test_recorded_keys",
+    "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
 )  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 
@@ -78,7 +80,7 @@ if __name__ == "__main__":
         own = {f"DRIVEPANEL_{name}": f"{folder}/{name}" for name in ("CONFIG", "STATE")}
         os.environ.update(own, HOME=folder, TZ="UTC", LC_ALL="C.UTF-8", DRIVEPANEL_RECORD="off")
         time.tzset()
-        for name in RECORDED:
+        for name in (name for name in RECORDED if all(word in name for word in sys.argv[1:])):
             module = importlib.import_module(f"tests.{name}")
             write_sections(module.TEXTS, module.SECTIONS)
     importlib.import_module("tests.drive.test_whole_profile").write_faults()

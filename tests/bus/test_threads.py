@@ -201,6 +201,19 @@ def test_ports_are_listed_in_order(tmp_path: Path) -> None:
     assert [port.path for port in list_ports()] == sorted(port.path for port in list_ports())
 
 
+def test_ports_are_ordered_by_the_numbers_in_their_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("ttyUSB10", "ttyUSB2", "ttyS1", "COM10", "COM9", "ttyUSB")
+    found = [SimpleNamespace(device=name, description="n/a") for name in names]
+    found.append(SimpleNamespace(device="ttyUSB3", description="USB-RS485"))
+    found.append(SimpleNamespace(device="ttyUSB4", description=None))
+    monkeypatch.setattr("tui.bus.transport.ports.system_ports.comports", lambda: found)
+    ports = {port.path: port.description for port in list_ports()}
+    order = ["COM9", "COM10", "ttyS1", "ttyUSB", "ttyUSB2", "ttyUSB3", "ttyUSB4", "ttyUSB10"]
+    assert list(ports) == order
+    assert [path for path, text in ports.items() if text] == ["ttyUSB3"]
+    assert ports["ttyUSB3"] == "USB-RS485"
+
+
 @pytest.mark.parametrize(("accepting", "loop"), [(False, True), (True, False), (False, False)])
 def test_line_that_is_closed_takes_no_work(accepting: bool, loop: bool) -> None:
     """Work that a loop which ends never begins would be waited for without an end."""

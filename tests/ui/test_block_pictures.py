@@ -9,6 +9,7 @@ import pytest
 from textual.pilot import Pilot
 
 from tests.sweeps import kept
+from tui.app import DrivePanelApp
 from tui.drive.blocks.assignment import slot_target
 from tui.drive.blocks.user_words import UserWord
 from tui.drive.profile import library
@@ -176,16 +177,9 @@ STATES: dict[str, tuple[Callable[[], BlockEditor], Any, float | None, list[str]]
 }
 
 
-@SIZES
-@pytest.mark.parametrize(
-    "state",
-    kept(STATES, "scanner", "write", "wrong", "exchange", "exchange-sure", "outputs", "indirect"),
-)
-def test_blocks(
-    snap_compare: Compare, state: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    make, prepare, armed, keys = STATES[state]
-    monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
+def panel(state: str) -> tuple[DrivePanelApp, DriveConsole]:
+    """The panel on a drive with blocks in a state."""
+    make, prepare, armed, _ = STATES[state]
     block_editor = make()
     prepare(block_editor)
     app = fakes.app_of(kind=fakes.Easel)
@@ -196,6 +190,20 @@ def test_blocks(
     console = DriveConsole(block_editor.session, block_editor.journal)
     console.blocks, console.monitor = block_editor, block_editor.monitor
     fakes.choose(app, console)
+    return app, console
+
+
+@SIZES
+@pytest.mark.parametrize(
+    "state",
+    kept(STATES, "scanner", "write", "wrong", "exchange", "exchange-sure", "outputs", "indirect"),
+)
+def test_blocks(
+    snap_compare: Compare, state: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
+    app, console = panel(state)
+    keys = STATES[state][3]
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(BlocksScreen(console))

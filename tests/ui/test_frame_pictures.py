@@ -9,6 +9,7 @@ import pytest
 from textual.pilot import Pilot
 
 from tests.sweeps import kept
+from tui.app import DrivePanelApp
 from tui.bus.api import DeviceCounters, Frame, LineCounters
 from tui.drive.profile import library
 from tui.screens.frames.screen import FramesScreen
@@ -84,12 +85,8 @@ PAGES: dict[str, tuple[Sequence[str], Callable[[DriveConsole], None]]] = {
 }
 
 
-@BOTH_SIZES
-@pytest.mark.parametrize("page", kept(PAGES, "filter", "lossy"))
-def test_frames(
-    snap_compare: Compare, page: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    keys, prepare = PAGES[page]
+def panel(page: str, monkeypatch: pytest.MonkeyPatch) -> tuple[DrivePanelApp, DriveConsole]:
+    """The panel on a drive after some exchanges."""
     monkeypatch.setattr("tui.screens.frames.screen.CounterKeys._begin_sum", lambda _: None)
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
     app = fakes.app_of(kind=fakes.Easel)
@@ -105,7 +102,17 @@ def test_frames(
     watch._line = LineCounters(
         devices={console.device: replace(OURS, requests=584, replies=598, timeouts=1)}
     )
-    prepare(console)
+    PAGES[page][1](console)
+    return app, console
+
+
+@BOTH_SIZES
+@pytest.mark.parametrize("page", kept(PAGES, "filter", "lossy"))
+def test_frames(
+    snap_compare: Compare, page: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, console = panel(page, monkeypatch)
+    keys = PAGES[page][0]
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(FramesScreen(console))
