@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 
 import pytest
 
@@ -42,6 +43,7 @@ def sizes(source: str, tree: ast.Module, module: str) -> Iterator[tuple[str, int
             yield f"{module}:{node.name}", len(public), MOST_METHODS
 
 
+@cache
 def project_sizes() -> list[tuple[str, int, int]]:
     return [
         size
