@@ -14,7 +14,7 @@ from tui.cli.commands import serve
 from tui.cli.commands.serve import with_named
 from tui.cli.plant.publish_options import read_drives
 from tui.cli.running.serving import GatewayWish
-from tui.cli.shared.host_port import host_port, written_host_port
+from tui.cli.shared.options import host_port, written_host_port
 from tui.cli.shared.served_lines import ServedLine, served_lines
 from tui.session.connect.open_line import OpenLine
 from tui.session.gateway.rules import GatewayRules

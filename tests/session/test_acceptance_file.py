@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from tests.sources import ROOT
+from tui.cli.derived import acceptance_schema
 from tui.drive.profile import library
 from tui.session.acceptance.plan import longest_motion, planned_motions
-from tui.session.acceptance.schema import acceptance_schema
 from tui.session.acceptance.step_file import AcceptanceFileError, read_test
 from tui.session.acceptance.steps import STEP_KINDS, moves_motor
 

@@ -12,8 +12,7 @@ from tui.bus.model import EndedExchange
 from tui.drive.profile import library
 from tui.session.record.decoding import HistoryPoint
 from tui.session.record.export_rows import export_rows, from_trigger
-from tui.session.record.history import History
-from tui.session.record.numbers import number_text
+from tui.session.record.history import History, number_text
 from tui.session.record.rebuilt_frames import RebuiltFrame, frames_of
 from tui.session.record.schema import reply_row, stray_row
 

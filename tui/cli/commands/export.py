@@ -297,7 +297,7 @@ class ValueTable:
     def cells(self, row: ExportRow) -> list[str]:
         """The cells of a row, in the order of `titles`."""
         from tui.session.record.export_rows import from_trigger
-        from tui.session.record.numbers import number_text
+        from tui.session.record.history import number_text
 
         texts: dict[str, tuple[str, ...]] = {}
         reasons = (

@@ -24,11 +24,17 @@ from ..plant.publish_options import (
 )
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, Service, served_until_signal
 from ..shared.completion import complete_line
-from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
 from ..shared.looking_after import guard_motors, say_shared
 from ..shared.numbers import SHORTEST_CYCLE, seconds
-from ..shared.options import CONNECT_WITHIN, devices_option, json_option, profile_of, usual_settings
+from ..shared.options import (
+    CONNECT_WITHIN,
+    devices_option,
+    host_port,
+    json_option,
+    profile_of,
+    usual_settings,
+)
 from ..shared.output import print_json
 from ..shared.registration import ON_LINE, command
 from ..shared.say import say

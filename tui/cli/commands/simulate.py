@@ -13,9 +13,8 @@ import click
 from tui.session.signals import handled
 
 from ..shared.completion import complete_profile
-from ..shared.host_port import host_port, written_host_port
 from ..shared.numbers import FiniteRange
-from ..shared.options import json_option
+from ..shared.options import host_port, json_option, written_host_port
 from ..shared.output import print_json
 from ..shared.registration import command
 from ..shared.say import say

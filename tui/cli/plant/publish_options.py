@@ -9,8 +9,7 @@ from pathlib import Path
 
 import click
 
-from ..shared.host_port import host_port, written_host_port
-from ..shared.options import Target
+from ..shared.options import Target, host_port, written_host_port
 from ..shared.say import say
 from ..shared.served_lines import ServedLine
 from .broker import Broker, broker_of

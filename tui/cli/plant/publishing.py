@@ -15,7 +15,7 @@ import tui
 from tui.bus.gateway.room import ServedConnection, host_of, makes_room
 
 from ..shared.errors import LINE_TROUBLE, Failure
-from ..shared.host_port import why_not_served, written_host_port
+from ..shared.options import why_not_served, written_host_port
 from .broker import Broker
 from .drives import PlantLine
 from .metrics import METRICS_TYPE, metrics_text

@@ -21,10 +21,9 @@ from tui.session.running.ending import Ending
 from ..plant.publish_options import PublishOptions, is_loopback
 from ..shared.drive_commands import close_journal, journal_document
 from ..shared.errors import LINE_TROUBLE, Failure
-from ..shared.host_port import why_not_served, written_host_port
 from ..shared.line_argument import mind_the_drive
 from ..shared.numbers import check_rate
-from ..shared.options import Target
+from ..shared.options import Target, why_not_served, written_host_port
 from ..shared.pending_timeouts import say_farewells
 from ..shared.say import say
 

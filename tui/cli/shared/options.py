@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
+import os
 from collections.abc import Callable, Coroutine
 from contextlib import ExitStack, suppress
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
@@ -333,3 +334,23 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
     from tui.session.shown import Rating
 
     session.ratings[current.code] = Rating(Decimal(str(rated_current)), "A")
+
+
+def host_port(text: str) -> tuple[str, int]:
+    """Host and port; loopback where only a port is given, any free port for 0."""
+    host, _, port = text.rpartition(":")
+    if not port.isdecimal() or int(port) > 65535:
+        raise click.UsageError(f"{text!r}: write HOST:PORT, for example 127.0.0.1:5020.")
+    return host.strip("[]") or "127.0.0.1", int(port)
+
+
+def written_host_port(host: str, port: int) -> str:
+    """The same as it is written, an IPv6 address in brackets."""
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def why_not_served(error: OSError) -> str:
+    """Why a place cannot be listened at, in the system's own words; asyncio wraps some of them."""
+    if error.errno is not None and error.errno > 0:
+        return os.strerror(error.errno)
+    return error.strerror or str(error)

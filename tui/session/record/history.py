@@ -12,6 +12,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Collection, Iterable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
+from decimal import Decimal
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
@@ -343,3 +344,12 @@ def oldest_reply(files: Sequence[Path], devices: Collection[int]) -> float | Non
         if times := [utc for utc in found if utc is not None]:
             return min(times) / 1e6
     return None
+
+
+def number_text(history: History, value: float) -> str:
+    """Return a value with the decimals of the parameter's scale; with 6 digits if unknown."""
+    entry = history.entry
+    if entry is None or entry.scale_source or history.unit == "raw":
+        return f"{value:.6g}"
+    decimals = -int(Decimal(entry.scale).normalize().as_tuple().exponent)
+    return f"{value:.{max(0, decimals)}f}"

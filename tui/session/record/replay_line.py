@@ -9,18 +9,22 @@ import threading
 from collections.abc import Callable, Coroutine, Sequence
 from concurrent.futures import Future
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from tui.bus.api import LineWorker
+from tui.bus.bounds import MOST_BYTES
 from tui.bus.errors import (
     LineClosed,
     LineLost,
+    LinkSyntaxError,
     NoAnswer,
     RequestRefused,
 )
 from tui.bus.expectation import IDENTIFY
 from tui.bus.limits import Limits
+from tui.bus.link import Link, SerialLink, TcpLink, parse_link
 from tui.bus.model import (
     DeviceState,
     IdentificationObjects,
@@ -37,12 +41,40 @@ from tui.bus.schedule.worker import Worker
 from tui.bus.shared_state import SharedState
 from tui.bus.tally import Tally
 from tui.bus.trace import Frame
+from tui.wire.frames import frame
 
-from .rebuilt_frames import frames_of
+from .rebuilt_frames import RebuiltFrame, frames_of
 from .replay_clock import ReplayClock
-from .replay_wire import replayed_link, wire_frame
 from .replayed_record import ReplayedRecord
 from .schema import RecordDamaged, to_microseconds
+
+NO_HOST = "replay.invalid"
+"""A name that no host can have: the line of a replay must never be reached."""
+
+
+def replayed_link(line: str) -> Link:
+    """Return the recorded link, to plan reads as then; it leads to no port and no host."""
+    try:
+        link = parse_link(line)
+    except LinkSyntaxError:
+        return SerialLink("replay")
+    if isinstance(link, SerialLink):
+        return replace(link, path="replay")
+    if isinstance(link, TcpLink):
+        return replace(link, host=NO_HOST)
+    return replace(link, host=NO_HOST)
+
+
+def wire_frame(rebuilt: RebuiltFrame, link: Link) -> Frame:
+    """Return a frame as the line of a link has it, with checksum or head."""
+    data = rebuilt.data
+    if rebuilt.checked and isinstance(link, TcpLink):
+        data = bytes(4) + (len(data) + 1).to_bytes(2, "big") + bytes([rebuilt.device]) + data
+    elif rebuilt.checked:
+        data = frame(rebuilt.device, data)
+    note = "" if rebuilt.checked else "damaged"
+    return Frame(rebuilt.wall, "out" if rebuilt.request else "in", data[:MOST_BYTES], note)
+
 
 T = TypeVar("T")
 

@@ -24,8 +24,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Chart, Quantity, StateKind
 
 from .decoding import HistoryPoint, joined_points
-from .history import History, read_history
-from .numbers import number_text
+from .history import History, number_text, read_history
 from .reader import RecordReader
 from .schema import EventRow, RecordDamaged, to_microseconds
 
