@@ -181,6 +181,35 @@ async def test_stop_key_shown_in_a_dialog_stops(
             await until(pilot, lambda: bottom(app).startswith(" Space STOP 2  "))
 
 
+@pytest.mark.parametrize("size", kept([(60, 16), (80, 24)], (60, 16)))
+async def test_frame_covers_no_part_of_a_dialog(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app = fakes.app_of(kind=fakes.Easel)
+    async with app.run_test(size=size) as pilot:
+        console, _ = await on_monitor(app, pilot, monkeypatch)
+        app.tell("A message of three rows. " * (size[0] // 10))
+        below = app.screen
+        assert isinstance(below, Framed)
+        await until(pilot, lambda: below.message_rows >= 3)
+        for name, make in DIALOGS.items():
+            app.push_screen(make(app, console))
+            await until(pilot, lambda: app.screen is not below)
+            await pilot.pause()
+            dialog = app.screen
+            assert isinstance(dialog, Framed)
+            top, bottom = 2, size[1] - 1 - dialog.message_rows
+            for part in dialog.children:
+                if part.id in dialog._frame_parts:
+                    continue
+                assert top <= part.region.y < part.region.bottom <= bottom, name
+                inner = part.region.shrink(part.styles.border.spacing)
+                for keys in part.query("#hint"):
+                    assert inner.contains_region(keys.region), name
+            app.pop_screen()
+            await until(pilot, lambda: app.screen is below)
+
+
 @pytest.mark.sweep  # every key on every question
 async def test_only_its_own_keys_affect_a_dialog(monkeypatch: pytest.MonkeyPatch) -> None:
     app = fakes.app_of(kind=fakes.Easel)

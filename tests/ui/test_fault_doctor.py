@@ -13,15 +13,15 @@ from tests.ui.fakes import NOW, readings_of
 from tui.drive.hints import reset_text
 from tui.drive.profile import library
 from tui.drive.sentences import capitalized
-from tui.screens.faults.doctor import EXCLUDED, LIKELIEST, OPEN, TOO_FEW, doctor_lines
+from tui.screens.faults.doctor import EXCLUDED, LIKELIEST, OPEN, TOO_FEW, UNDECIDED, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
 from tui.screens.faults.next_steps import ARM, BESIDE_KEY
 from tui.screens.faults.parts import LABEL
 from tui.screens.faults.screen import FaultsScreen
-from tui.screens.faults.view import history_rows
+from tui.screens.faults.view import history_rows, record_lines
 from tui.session.drive import DriveSession
 from tui.session.journal import Entry
-from tui.session.monitor.fault_record import FaultRecord
+from tui.session.monitor.fault_record import FaultRecord, Moment
 from tui.session.monitor.trend import TrendPoint
 from tui.session.monitor.watched import SeenTrip, Watched
 from tui.widgets.curve import ASCII_SIGNS, BRAILLE, CurveSigns
@@ -76,7 +76,21 @@ def test_every_fault_fits_80_columns(family: str) -> None:
         ):
             assert part in text, (fault.code, part)
         assert "…" not in text.partition("Why")[2], fault.code
-        assert all(line.cell_len <= 80 for line in doctor_lines(shown, 80, 50))
+        lines = [line.plain for line in doctor_lines(shown, 80, 50)]
+        assert all(len(line) <= 80 for line in lines)
+        starts = {line.index(UNDECIDED) for line in lines if UNDECIDED in line}
+        assert len(starts) <= 1, (fault.code, "reasons are below each other")
+
+
+@pytest.mark.parametrize("width", [60, 80, 120, 200])
+def test_values_before_the_trip_are_whole(width: int) -> None:
+    state = "Decelerating"
+    moments = tuple(Moment(0.0, -0.5 * n, "", ("40.0", "3.2", state)) for n in range(3))
+    record = FaultRecord(NOW, 0.0, None, (), ("RFR Hz", "LCR A", "HMIS"), moments, ())
+    lines = [line.plain for line in record_lines(record, width, 20, 0)]
+    assert [line.count(state) for line in lines[2:]] == [1, 1, 1]
+    assert {len(line) for line in lines[1:]} == {len(lines[1])}
+    assert len(lines[1]) <= width
 
 
 @pytest.mark.parametrize("width", [60, 80, 120, 200])

@@ -224,7 +224,9 @@ def pages() -> Iterator[str]:
         shown = tuple(differences(grown)) if drive else ()
         found = CountersNow(total, since, 65.0, load, load, "keeper", drive, trouble, shown)
         for width, height in ((60, 18), (100, 40)):
-            yield from map(drawn, counters_lines(found, "2 Pump", width, height))
+            lines = counters_lines(found, "2 Pump", width, height)
+            assert not any("…" in line.plain for line in lines[:12])
+            yield from map(drawn, lines)
     run = RecordedRun(7, "p", NOON, NOON + 65, 0.5, 0.5, "forward", "30.0 Hz", "", "", "panel (12)")
     found_changes = ChangeList(ENTRIES, [LineRun("rtu:x", run)])
     found_changes.losses.append(LineLoss("rtu:x", LostLink(None, NOON, NOON + 9.6, "gone")))

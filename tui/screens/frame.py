@@ -61,6 +61,8 @@ NOT_STOPPED_HEAD = "NOT STOPPED"
 NOT_STOPPED_LINES = 6
 """Rows for motors that did not stop; more are counted in one sentence."""
 NOT_STOPPED_MANY = "NOT STOPPED: {} drives. Stop them at the machine. Press m for the reasons."
+DIALOG_SHARE, TOP_ROWS = 0.83, 2
+"""Part of the terminal's height for a dialog, as `max-height`, and rows of the frame above it."""
 DIALOG_KEYS = "dialog-keys"
 """Id of the stop keys of a dialog; they cover the key bar of the screen below."""
 
@@ -126,8 +128,30 @@ class Framed(Screen[Any]):
         """True if the terminal is too small for the screen."""
         return is_too_small(*self.app.size)
 
+    @property
+    def dialog_rows(self) -> int:
+        """Rows of a dialog at most: the frame covers no part of it."""
+        height = self.app.size.height
+        below = max(1, self._rows_below()) + 1
+        return min(int(height * DIALOG_SHARE), height - TOP_ROWS - below)
+
+    def on_mount(self) -> None:
+        """Keep a dialog between the tabs and the message."""
+        self._fit_dialog()
+
+    def _fit_dialog(self) -> None:
+        if not self.is_modal:
+            return
+        is_centered = self.styles.align_vertical == "middle"
+        for part in self.children:
+            if part.id not in self._frame_parts:
+                part.styles.max_height = self.dialog_rows
+                if is_centered:
+                    part.styles.margin = (0, 0, max(0, self._rows_below() + 1 - TOP_ROWS), 0)
+
     def on_resize(self, event: Resize) -> None:
         """Show immediately if the terminal is too small now."""
+        self._fit_dialog()
         if self.is_current and self.app.is_running:
             self.draw_frame(self.app.frame_now())
 

@@ -112,7 +112,7 @@ class WhyScreen(Framed, ModalScreen[None]):
 def reason_lines(found: Diagnosis | None, width: int) -> Iterator[Text]:
     """Yield the failed check and the next steps, in lines; None: no result yet."""
     if found is None:
-        yield Text(LOOKING, FAINT)
+        yield from (Text(part, FAINT) for part in wrapped(LOOKING, width, 2))
         return
     style = RUNNING if found.well else ALARM
     yield from (Text(part, style) for part in wrapped(found.text, width, SENTENCE_ROWS))

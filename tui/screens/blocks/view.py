@@ -177,6 +177,7 @@ def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) 
     second.append(f"   unit {parameter.unit or '-'}" if width >= NARROW_SLOT else "", FAINT)
     if raw == slot.raw:
         through = "last written" if block.direction == "write" else "through the block"
+        through = through if width >= NARROW_SLOT else through.split()[-1]
         second.append(f"   {through} ", FAINT)
         second.append(slot.text, STRONG)
         second.append("   direct ", FAINT)

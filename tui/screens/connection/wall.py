@@ -109,7 +109,7 @@ SINGLE_ROWS = (
     WallColumns(12, 0, 13, 0, 18, 24),
     WallColumns(12, 0, 13, 0, 12, 19),
     WallColumns(10, 0, 12, 0, 12, 6),
-    WallColumns(9, 0, 11, 0, 6, 8),
+    WallColumns(11, 0, 11, 0, 6, 6),
     WallColumns(9, 0, 12, 0, 0, 8),
     WallColumns(8, 0, 11, 0, 0, 6),
     WallColumns(0, 0, 10, 0, 0, 5),

@@ -35,8 +35,8 @@ T = TypeVar("T")
 DIALOG_STYLES = Path(__file__).with_name("dialogs.tcss")
 """Absolute, as Textual resolves it from the module of the subclass, which may be elsewhere."""
 
-DIALOG_SHARE, BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 0.83, 2, 4, 2
-"""Share of the screen's rows for a dialog; rows of its border; columns of border and padding; rows
+BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 2, 4, 2
+"""Rows of the border of a dialog; columns of its border and padding; rows
 that a list keeps."""
 
 TYPED_ON = "Key ignored: a question appeared as you typed. Wait a second, then answer."
@@ -117,8 +117,9 @@ class Question(Framed, ModalScreen[T]):
             most = int(wide.value) if wide is not None and wide.is_cells else self.size.width
             width = min(most, self.size.width) - BESIDE_TEXT
             others = sum(self._rows(child, width) for child in box.children if child is not part)
-            rows = int(self.size.height * DIALOG_SHARE) - BORDER_ROWS - others
-            part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)
+            rows = self.dialog_rows - BORDER_ROWS - others
+            least = LEAST_ROWS if part.id == "choices" else 1
+            part.styles.max_height = max(least, rows - part.styles.margin.height)
 
     def _rows(self, part: Widget, width: int) -> int:
         """Rows of a part of the dialog, with its margins."""

@@ -108,6 +108,7 @@ def _before_text(reading: Shown, last: float) -> tuple[str, Style]:
     return (text, PLAIN) if age <= TRIP_NEAR else (f"{text} -{age:.0f}s", STALE)
 
 
+UNDECIDED = "no value decides"
 SIGN_WIDTH = 4
 """Columns of the sign before a cause."""
 LIKELIEST, OPEN, EXCLUDED = "▸", "?", "×"
@@ -151,7 +152,7 @@ def _rows(cause: WeighedCause, first: bool, aligned: int, width: int) -> list[Te
     text.append(f"{sign} ", FAINT if excluded else STRONG if likely else ALARM)
     style = STRUCK if excluded else STRONG if first else PLAIN
     text.append(cut(cause.text, min(len(cause.text), width - SIGN_WIDTH)).rstrip(), style)
-    aligned = min(aligned, width // 2 + SIGN_WIDTH)
+    aligned = min(aligned, max(width // 2 + SIGN_WIDTH, width - len(UNDECIDED)))
     reason = reason_text(cause)
     if max(aligned, text.cell_len + 2) + len(reason) > width:
         reason = reason_text(cause, 1)
@@ -173,7 +174,7 @@ def reason_text(cause: WeighedCause, most: int = 2) -> str:
     """Return the values that decided about a cause, `most` of them, or why none did."""
     if cause.verdict == "open":
         unknown = ", ".join(cause.unknown[:2])
-        return f"not known: {unknown}" if unknown else "no value decides"
+        return f"not known: {unknown}" if unknown else UNDECIDED
     texts = [evidence.text for evidence in cause.evidence[:most]]
     text = "; ".join(texts)
     if cause.evidence[0].basis == "now" and cause.verdict == "excluded":

@@ -14,7 +14,7 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment
 from tui.session.shown import Shown
-from tui.widgets.drawing import fitted_names, rule
+from tui.widgets.drawing import fitted_names, rule, short
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, PLAIN, STRONG
 
 from .doctor_view import DoctorView
@@ -88,30 +88,39 @@ def record_lines(record: FaultRecord | None, width: int, height: int, offset: in
     if not record.writes:
         title = f"Before the trip: {cycles} cycles"
     head = Text(f" {'s':>{FAULT_TIME_WIDTH - 1}}", FAINT, no_wrap=True)
-    for heading in record.headings[: _columns(width)]:
-        head.append(f"{heading[: RECORD_VALUE_WIDTH - 1]:>{RECORD_VALUE_WIDTH}}", FAINT)
+    for heading, cells in zip(record.headings, _columns(record, width), strict=False):
+        head.append(f"{short(heading, cells - 1):>{cells}}", FAINT)
     rows = record_rows(record, width)
     return [rule(title, width), head, *rows[offset : offset + max(1, height - 2)]]
 
 
 def record_rows(record: FaultRecord, width: int) -> list[Text]:
     """Return a row for each cycle and each write, newest first."""
-    rows = [(moment.wall, _moment(moment, record, width)) for moment in record.moments]
+    columns = _columns(record, width)
+    rows = [(moment.wall, _moment(moment, record, columns)) for moment in record.moments]
     for entry in record.writes:
         wall = datetime.fromisoformat(entry.time).timestamp()
         rows.append((wall, _write(entry, wall - record.wall, width)))
     return [text for _, text in sorted(rows, key=lambda row: -row[0])]
 
 
-def _columns(width: int) -> int:
-    return max(1, (width - FAULT_TIME_WIDTH - 1) // RECORD_VALUE_WIDTH)
+def _columns(record: FaultRecord, width: int) -> list[int]:
+    """Return the cells of the columns that fit, each as wide as its longest value; one at least."""
+    found: list[int] = []
+    room = width - FAULT_TIME_WIDTH - 1
+    for texts in zip(record.headings, *(m.texts for m in record.moments), strict=False):
+        cells = max(RECORD_VALUE_WIDTH, 1 + max(map(len, texts)))
+        if found and sum(found) + cells > room:
+            break
+        found.append(min(cells, room))
+    return found
 
 
-def _moment(moment: Moment, record: FaultRecord, width: int) -> Text:
+def _moment(moment: Moment, record: FaultRecord, columns: Sequence[int]) -> Text:
     after = moment.wall - record.wall
     text = Text(f" {after:>{FAULT_TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
-    for value in moment.texts[: _columns(width)]:
-        text.append(f"{value[: RECORD_VALUE_WIDTH - 1]:>{RECORD_VALUE_WIDTH}}", PLAIN)
+    for value, cells in zip(moment.texts, columns, strict=False):
+        text.append(f"{short(value, cells - 1):>{cells}}", PLAIN)
     if after >= 0:
         text.stylize(ALARM, 0, FAULT_TIME_WIDTH)
     return text

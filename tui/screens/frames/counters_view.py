@@ -14,8 +14,9 @@ from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNI
 
 EIGHTHS = " ▁▂▃▄▅▆▇█"
 """Bar characters from 0 to 8 eighths of a row."""
-LEFT = 42
-"""Columns of our counts; the drive's own counters are to their right."""
+LEFT, NARROW_LEFT, WHOLE_COUNTS = 42, 24, 79
+"""Columns of our counts, also in a page of less than so many; the drive's own counters are to their
+right."""
 BAR_WIDTH = 7
 TALL, TALL_BARS, LOW_BARS = 30, 6, 1
 """Minimum rows of the page for tall bars; rows of tall bars and of low bars."""
@@ -30,8 +31,9 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
     """Lay out the page in at most `height` rows; `who` names the drive in the heading."""
     by = f"counted by {found.counted_by}" if found.counted_by else "counted by this panel"
     lines = [rule(f"Counters of {who}", width, by)]
-    lines += beside(our_lines(found), drive_lines(found, width - LEFT), width)
-    lines += load_lines(found)
+    left = LEFT if width >= WHOLE_COUNTS else NARROW_LEFT
+    lines += beside(our_lines(found, left), drive_lines(found, width - left), width, left)
+    lines += load_lines(found, LOAD_CELLS if width >= WHOLE_COUNTS else LOAD_CELLS // 2)
     lines.append(rule("Turnaround of the drive, in ms", width, "since the line was opened"))
     tall = TALL_BARS if height >= TALL else LOW_BARS
     lines += bar_lines(bars(found.total.turnarounds), tall)
@@ -40,13 +42,15 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
     return lines[:height]
 
 
-def our_lines(found: CountersNow) -> list[Text]:
+def our_lines(found: CountersNow, width: int = LEFT) -> list[Text]:
     """Return the counts since the line was opened, and since the last reset.
 
-    They are those of the program that holds the line.
+    They are those of the program that holds the line. A narrow column has only the latter.
     """
     total, since = found.total, found.since
-    head = Text(f" {'This panel':<15}{'since open':>12}{time_text(found.seconds):>12}", FAINT)
+    counts, cells = ("since open", 12) if width >= LEFT else ("", 0)
+    head = Text(f" {'This panel':<10}{counts:>{cells + 5 if cells else 0}}", FAINT)
+    head.append(f"{time_text(found.seconds):>{width - 2 - head.cell_len}}")
     rows = [
         ("frames sent", total.requests, since.requests),
         ("answered", total.replies, since.replies),
@@ -62,8 +66,9 @@ def our_lines(found: CountersNow) -> list[Text]:
     lines = [head]
     for name, all_of_them, lately in rows:
         text = Text(f" {name:<15}", FAINT, no_wrap=True)
-        text.append(f"{all_of_them:>12}", PLAIN)
-        text.append(f"{lately:>12}", ALARM if name in lost and lately else STRONG)
+        text.append(f"{all_of_them:>{cells}}" if cells else "", PLAIN)
+        style = ALARM if name in lost and lately else STRONG
+        text.append(f"{lately:>{width - 2 - text.cell_len}}", style)
         lines.append(text)
     return lines
 
@@ -85,25 +90,27 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
     if not found.drive:
         none = Text("None reported or read yet.", FAINT)
         return [Text("The drive's own", FAINT), none, *codes]
-    lines = [Text(f"{'The drive itself':<16}{'now':>6}{'since':>7}{'sent':>8}", FAINT)]
+    cells = min(16, width - 21)
+    head = short("The drive", cells) if cells < 16 else "The drive itself"
+    lines = [Text(f"{head:<{cells}}{'now':>6}{'since':>7}{'sent':>8}", FAINT)]
     for name, comparison in found.drive:
-        lines += _pair(name, comparison)
+        lines += _pair(name, comparison, cells)
     return [*lines, *codes]
 
 
-def _pair(name: str, comparison: Comparison) -> list[Text]:
+def _pair(name: str, comparison: Comparison, cells: int) -> list[Text]:
     """Return two rows for a pair of counters: frames, and frames with a bad checksum.
 
-    The columns are: now, since the first reading, sent by us since then.
+    Names have `cells`. The columns are: now, since the first reading, sent by us since then.
     """
     # counters of another port are shown but not compared
     other = comparison.counts_this_line is False
     strong, sent = FAINT if other else STRONG, comparison.sent
     ours = min(max(comparison.frames, sent.low), sent.high)
-    frames = Text(f"{short(name, 15):<16}", FAINT if other else PLAIN, no_wrap=True)
+    frames = Text(f"{short(name, cells - 1):<{cells}}", FAINT if other else PLAIN, no_wrap=True)
     frames.append(f"{comparison.last.frames:>6}").append(f"{comparison.frames:>7}", strong)
     frames.append("" if other else f"{ours:>8}", PLAIN if ours == comparison.frames else ALARM)
-    errors = Text(f"{'  bad checksum':<16}", FAINT, no_wrap=True)
+    errors = Text(f"{'  bad checksum':<{cells}}", FAINT, no_wrap=True)
     most = (
         f">{comparison.last.damaged}" if comparison.last.saturated else str(comparison.last.damaged)
     )
@@ -112,25 +119,27 @@ def _pair(name: str, comparison: Comparison) -> list[Text]:
     return [frames, errors]
 
 
-def beside(left: Sequence[Text], right: Sequence[Text], width: int) -> list[Text]:
-    """Join two columns of rows; the right one starts at column `LEFT`."""
+def beside(
+    left: Sequence[Text], right: Sequence[Text], width: int, column: int = LEFT
+) -> list[Text]:
+    """Join two columns of rows; the right one starts at this column."""
     lines = []
     for at in range(max(len(left), len(right))):
         text = left[at].copy() if at < len(left) else Text(no_wrap=True)
         if at < len(right):
-            text.append(" " * max(0, LEFT - text.cell_len)).append_text(right[at])
+            text.append(" " * max(0, column - text.cell_len)).append_text(right[at])
         text.truncate(width, overflow="ellipsis")
         lines.append(text)
     return lines
 
 
-def load_lines(found: CountersNow) -> list[Text]:
+def load_lines(found: CountersNow, cells: int = LOAD_CELLS) -> list[Text]:
     """Return a row with the load of the line since the last reset; dashes if unknown."""
     text = Text(" load of the line ", FAINT, no_wrap=True)
     if found.line_load is None or found.device_load is None:
         return [text.append("-----", FAINT)]
-    full = round(LOAD_CELLS * found.line_load)
-    text.append("▕", FAINT).append("█" * full, BAR).append("·" * (LOAD_CELLS - full), BAR_REST)
+    full = round(cells * found.line_load)
+    text.append("▕", FAINT).append("█" * full, BAR).append("·" * (cells - full), BAR_REST)
     text.append("▏", FAINT).append(f"{100 * found.line_load:>4.0f} %", STRONG)
     text.append("   with this drive ", FAINT).append(f"{100 * found.device_load:.0f} %", PLAIN)
     return [text]

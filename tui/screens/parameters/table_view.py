@@ -81,6 +81,8 @@ class Filled(NamedTuple):
     range: bool
     name: int
     """Cells of the longest name, with a space."""
+    value_now: int = 0
+    """Cells of the longest value that is shown now."""
     value: int = 0
     """Cells of the longest value in the list, or of the longest name of one."""
 
@@ -105,6 +107,7 @@ def layout_of(editor: Editor, items: Sequence[TableLine], width: int) -> TableLa
         any(other_text(editor, p) for p in parameters),
         any(range_text(editor, p) for p in parameters),
         max(map(len, names), default=0) + 1,
+        min(TEXT_MOST, now),
         min(TEXT_MOST, max(now, longest)),
     )
     columns = fitting_columns(width, filled)
@@ -159,11 +162,16 @@ def fitting_columns(width: int, filled: Filled) -> Columns:
 
 
 def _with_longer_values(columns: Columns, width: int, filled: Filled) -> Columns:
-    """Return the columns with values as long as the list has them, if its names leave the room."""
+    """Return the columns with values as long as the list has them, if its names leave the room.
+
+    For the values that are shown now, names are shortened, too.
+    """
     shared = 1 + filled.staged + filled.other
     least = LEAST_STAGED_NAME if filled.staged else LEAST_NAME
-    spare = (width - columns.taken - min(filled.name, least)) // shared
-    value = max(columns.value, min(filled.value, columns.value + spare))
+    value = columns.value
+    for name, longest in ((filled.name, filled.value), (least, filled.value_now)):
+        spare = (width - columns.taken - min(filled.name, name)) // shared
+        value = max(value, min(longest, columns.value + spare))
     return columns._replace(
         value=value,
         staged=value if filled.staged else 0,

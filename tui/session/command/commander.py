@@ -95,8 +95,9 @@ class Commander:
             codes = [*deciding_codes(session.profile), *session.profile.data.status_codes]
             await Reader(session).read(dict.fromkeys(codes))
             if session.state(STATE_FRESH).kind == "unknown":
+                head = "Not armed" if self.armed_for is None else "Arming not renewed"
                 raise OrderRefused(
-                    "Not armed: the state of the drive is not known. Check the line, and try again."
+                    f"{head}: the state of the drive is not known. Check the line, and try again."
                 )
             session.work.arm(requested, seconds)
             return ""
