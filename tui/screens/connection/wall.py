@@ -272,7 +272,9 @@ def _second_row(row: WallRow, columns: WallColumns) -> Text:
     if row.reference and not old:
         text.append(f"{short(f'→ {row.reference}', HERTZ):>{HERTZ}}{'':>{CURRENT}}", KEY)
     else:
-        text.append(f"{old:>{HERTZ}}{f'{old} ' if old else '':>{CURRENT}}", ALARM)
+        # only below a value: the message has the age, too
+        ages = old if row.frequency else "", f"{old} " if old and row.current else ""
+        text.append(f"{ages[0]:>{HERTZ}}{ages[1]:>{CURRENT}}", ALARM)
     text.append(" " * (columns.load + 1 if columns.load else 0))
     if columns.curve:
         _append_curve(text, row, 1, columns)
