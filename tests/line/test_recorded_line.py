@@ -196,4 +196,4 @@ def test_keeper_whose_record_cannot_be_written_serves_and_says_so_once(wire: Exc
         assert len(wire) >= 20
         end_keepers()
     log = (state / "drivepanel.log").read_text()
-    assert log.count("Nothing is recorded: Not a directory") == 1
+    assert log.count("Nothing is recorded: a file is in the place of a folder") == 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import signal
 import sqlite3
@@ -12,6 +13,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import HealthCheck, given, settings
@@ -21,6 +23,7 @@ from tests.programs import wait_until
 from tests.sources import ROOT
 from tui.bus.model import EndedExchange
 from tui.session.record import record_file, recorder
+from tui.session.record.disk_trouble import disk_words, from_sqlite
 from tui.session.record.reader import RecordedWord, RecordReader
 from tui.session.record.record_file import RecordFile
 from tui.session.record.recorder import LineRecorder
@@ -396,8 +399,50 @@ def test_oldest_days_make_room_and_open_files_stay(folder: Path) -> None:
     for path in paths:
         path.write_bytes(bytes(1000))
     paths[1].with_name(paths[1].name + "-wal").write_bytes(bytes(10))
-    assert make_room(folder, [paths[0]], 2200) <= 0
-    assert files(folder) == [paths[0], paths[1]]  # the second may be in use by another keeper
+    excess, closed = make_room(folder, [paths[0]], 2200)
+    assert files(folder) == [paths[0], paths[1], paths[3]]  # the second may be in use elsewhere
+    assert (0 < excess < 1000, closed) == (True, paths[3])  # of the last, a part has to go
+    assert make_room(folder, [paths[0]], 1100) == (978, None)
+
+
+def test_closed_day_that_is_too_large_loses_its_oldest_rows_only(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(recorder, "ROOM_MADE_EVERY", 0.0)
+    monkeypatch.setattr(record_file, "SHED_AT_A_TIME", 100)
+    path = record_path(folder, LINE, 3)
+    rows = [row_of(at % 7, mono=at - 2 * HOUR, wall=3 * A_DAY + at) for at in range(0, 60_000, 10)]
+    file = RecordFile(path, "serial:x", "")
+    file.write(rows, [EventRow(1, 1, 1, "profile", "atv71")])
+    file.close(shrink=True)
+    before = path.stat().st_size
+    written(record_path(folder, LINE, 4), [row_of(1)]).close()
+    record = opened(folder, most=before)
+    record.note(read_now(1))
+    wait_until(lambda: path.stat().st_size < before, "it is smaller")
+    assert record.close(60)
+    assert before // 2 < path.stat().st_size < before * 15 // 16
+    with closing(RecordReader(path)) as reader:
+        kept = [item.utc for item in reader.reduced(1, REGISTER, *EVER)]
+        whole = [item.utc for item in reader.words(1, REGISTER, *EVER)]
+    assert kept[-1] == rows[-1].utc
+    assert len(kept) < len(rows)
+    assert whole[0] > kept[0] - 1_100_000_000  # 100 reduced rows are 1000 s
+    assert [event.text for event in events_in(path, "profile")] == ["atv71"]
+
+
+def test_file_gives_the_room_of_removed_rows_back_to_the_disk(folder: Path) -> None:
+    path = record_path(folder, LINE, 3)
+    file = written(path, [row_of(at, mono=at / 10 - 2 * HOUR) for at in range(6000)])
+    file.end_window(round(START * 1e6))
+    file.flush()
+    before = path.stat().st_size
+    while file.expire(1e9, START):
+        pass
+    file.close(shrink=True)
+    assert path.stat().st_size < before / 2
+    with closing(sqlite3.connect(path)) as base:
+        assert base.execute("PRAGMA freelist_count").fetchone() == (0,)
 
 
 def test_file_that_is_too_large_alone_loses_its_oldest_rows(
@@ -531,6 +576,28 @@ def test_full_disk_is_reported_once_and_nothing_is_lost_once_there_is_room(folde
     assert [item.word for item in words_in(path)] == list(range(6000))
     with closing(RecordReader(path)) as reader:
         assert sum(item.good for item in reader.reduced(1, REGISTER, *EVER)) == 6000
+
+
+@pytest.mark.parametrize(
+    ("code", "cause", "words"),
+    [
+        (sqlite3.SQLITE_IOERR, errno.EROFS, "the disk is read-only"),
+        (sqlite3.SQLITE_IOERR | 3 << 8, errno.ENOSPC, "the disk is full"),
+        (sqlite3.SQLITE_IOERR, None, "the disk reports an error"),
+        (sqlite3.SQLITE_FULL, None, "the disk is full"),
+        (sqlite3.SQLITE_CANTOPEN, errno.EACCES, "this user may not write there"),
+        (sqlite3.SQLITE_ERROR, None, "as SQLite says"),
+    ],
+)
+def test_disk_error_is_reported_with_its_cause_in_plain_words(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, code: int, cause: int | None, words: str
+) -> None:
+    if cause is not None:
+        monkeypatch.setattr("tempfile.TemporaryFile", Mock(side_effect=OSError(cause, "x")))
+    error = sqlite3.OperationalError("as SQLite says")
+    error.sqlite_errorcode = code
+    assert disk_words(from_sqlite(error, folder / "a.sqlite")) == words
+    assert os.listdir(folder) == []
 
 
 @pytest.mark.parametrize("damage", ["no record", "damaged page", "another version"])

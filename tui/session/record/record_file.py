@@ -20,7 +20,8 @@ import tui
 from tui.drive.small_file import read_small_text
 
 from ..stored import make_folder
-from .reduction import ReducedRow, ReductionWindow
+from .disk_trouble import from_sqlite
+from .reduction import REDUCED_OVER, ReducedRow, ReductionWindow
 from .schema import (
     QUALITIES,
     RECORD_ID,
@@ -39,6 +40,8 @@ RAW_KEPT = 3600 * 1_000_000
 EXPIRED_AT_A_TIME = 1000
 """Rows that are removed in one transaction."""
 SHED_AT_A_TIME = 5000
+PAGES_GIVEN_BACK = 1000
+"""Pages (4 KiB) that are returned to the disk in one transaction."""
 MOST_WAL = 8 << 20
 """Bytes of the file's log; beyond, nothing is written until no reader holds it."""
 USUAL_WAL = 2 << 20
@@ -51,6 +54,12 @@ _BUSY = (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED)
 _INSERT_REPLY = f"INSERT INTO reply VALUES (NULL{',?' * 14})"
 _INSERT_REDUCED = f"INSERT INTO reduced VALUES (NULL{',?' * 11})"
 _INSERT_EVENT = f"INSERT OR IGNORE INTO event VALUES (NULL{',?' * 8})"
+
+
+_BEFORE_REDUCED = (
+    f"AND utc <= (SELECT coalesce(min(utc) + {REDUCED_OVER}, {1 << 62}) FROM"
+    " (SELECT utc FROM reduced ORDER BY id LIMIT 1))"
+)
 
 
 class RecordFile:
@@ -234,19 +243,44 @@ class RecordFile:
         return wall - utc > RAW_KEPT or mono - self._begun > RAW_KEPT
 
     def shed(self) -> bool:
-        """Remove some of the oldest rows, those of whole replies first; False if it is empty."""
+        """Remove some of the oldest rows; False if there are none.
+
+        Whole replies go before reduced rows of their time, and events last: they name the profiles.
+        """
         removed = 0
-        for table in ("reply", "reduced", "event"):
+        for table, older in (("reply", _BEFORE_REDUCED), ("reduced", ""), ("event", "")):
             if removed:
                 break
             with self._transaction():
                 removed = self._base.execute(
-                    f"DELETE FROM {table} WHERE id IN (SELECT id FROM {table} ORDER BY id LIMIT ?)",
+                    f"DELETE FROM {table} WHERE id IN"
+                    f" (SELECT id FROM {table} ORDER BY id LIMIT ?) {older}",
                     (SHED_AT_A_TIME,),
                 ).rowcount
         if self._wal_size() > USUAL_WAL:
             self.flush()
         return removed > 0
+
+    def trim(self, excess: int) -> None:
+        """Remove the oldest rows, until so many bytes are free or no row is left."""
+        least = self.size - excess
+        while self.size > least and self.shed():
+            pass
+
+    def give_back(self) -> None:
+        """Return some room of removed rows to the disk."""
+        with _as_os_errors(self.path):
+            self._give_back()
+
+    def _give_back(self) -> bool:
+        """Return room to the disk, a few MB at a time, as the log has it too; True if it did."""
+        spare = self._pragma("freelist_count")
+        if spare:
+            # by a script: a statement ends after its first page
+            self._base.executescript(f"PRAGMA incremental_vacuum({PAGES_GIVEN_BACK})")
+            if self._wal_size() > USUAL_WAL:
+                self._checkpoint()
+        return self._pragma("freelist_count") < spare
 
     def flush(self) -> None:
         """Have the disk hold what was written; waits for the disk."""
@@ -264,8 +298,8 @@ class RecordFile:
                     with self._transaction():
                         self._reduce(ended, self._session_id())
                         self._note_reduced()
-                if shrink:
-                    self._base.execute("PRAGMA incremental_vacuum").fetchall()
+                while shrink and self._give_back():
+                    pass
                 with suppress(sqlite3.OperationalError):  # read by another program at the moment
                     self._base.execute("PRAGMA journal_mode = DELETE")
         finally:
@@ -314,7 +348,7 @@ def _as_os_errors(path: Path) -> Iterator[None]:
             raise RecordDamaged(str(error), path) from error
         if number in _BUSY:
             raise RecordHeld(str(error)) from error
-        raise OSError(str(error)) from error
+        raise from_sqlite(error, path) from error
 
 
 @cache

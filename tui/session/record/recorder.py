@@ -18,6 +18,7 @@ from tui.bus.model import EndedExchange
 from tui.drive.sentences import counted
 
 from .clock_jumps import ClockJumps
+from .disk_trouble import disk_words, unrecorded_text
 from .ring import (
     DAMAGED_MARK,
     MOST_RECORDED,
@@ -50,6 +51,8 @@ WRITTEN_AT_A_TIME = 1000
 REDUCED_EVERY = 10.0
 """Seconds from one removal of reduced rows to the next."""
 ROOM_MADE_EVERY = 10.0
+TRIMMED_MORE = 4 << 20
+"""Bytes beyond those needed by which a closed file is made smaller."""
 RETRIED_AFTER = 2.0
 """Seconds after which a disk that refused is tried again."""
 HELD_PATIENCE = 10.0
@@ -303,14 +306,20 @@ class LineRecorder:
                 if time.monotonic() - now > WRITTEN_EVERY / 2:
                     self._reduced = 0.0  # the rest in the next turn
                     return
-            if path != today and not file.has_raw:
+            if path == today:
+                continue
+            file.give_back()  # the new day needs that room
+            if not file.has_raw:
                 del self._files[path]
                 file.close(shrink=True)
 
     def _make_room(self, now: float) -> None:
         """Remove the oldest data if there is too much, for a moment at most."""
-        excess = make_room(self._folder, self._files, self._most)
-        excess -= sum(file.spare for file in self._files.values())
+        spare = sum(file.spare for file in self._files.values())
+        excess, closed = make_room(self._folder, self._files, self._most + spare)
+        if closed is not None:
+            self._trim(closed, excess)
+            return
         for _, file in sorted(self._files.items()):
             while excess > 0:
                 before = file.size
@@ -320,6 +329,15 @@ class LineRecorder:
                 if time.monotonic() - now > WRITTEN_EVERY / 2:
                     self._roomed = 0.0
                     return
+
+    def _trim(self, path: Path, excess: int) -> None:
+        """Remove the oldest rows of a closed file, some more than needed: it is done seldom."""
+        with suppress(RecordHeld):  # a program reads it: later
+            file = self._opened(path)
+            try:
+                file.trim(excess + min(TRIMMED_MORE, self._most // 32))
+            finally:
+                file.close(shrink=True)
 
     def _recover(self) -> None:
         """Record what was lost until now."""
@@ -346,7 +364,7 @@ class LineRecorder:
     def _fail(self, error: OSError, now: float) -> None:
         """Give the files up until the disk is tried again, and report it once."""
         self._failing_since = self._failing_since or now
-        self._why, self._failed = error.strerror or str(error), now
+        self._why, self._failed = disk_words(error), now
         self._retry_at = now + RETRIED_AFTER
         patience = HELD_PATIENCE if isinstance(error, RecordHeld) else 0.0
         first = not self._reported and now - self._failing_since >= patience
@@ -359,7 +377,7 @@ class LineRecorder:
             with suppress(OSError):
                 self._set_aside(error)
         if first:
-            self._tell(f"Nothing is recorded: {self._why}: {self._folder}.")
+            self._tell(unrecorded_text(self._why, self._folder, RECORD_BACKLOG))
 
     def _tell(self, text: str) -> None:
         log.warning("%s", text)

@@ -51,10 +51,14 @@ def is_open_or_left(path: Path) -> bool:
     return path.with_name(path.name + SIDE_FILES[0]).exists()
 
 
-def make_room(folder: Path, used: Collection[Path], most: int = MOST_RECORDED) -> int:
-    """Remove the files of the oldest days until all have room; return the bytes still too many.
+def make_room(
+    folder: Path, used: Collection[Path], most: int = MOST_RECORDED
+) -> tuple[int, Path | None]:
+    """Remove the files of the oldest days that must go as a whole.
 
-    `used` are never removed, nor what another keeper may be writing. Raises OSError.
+    Return the bytes that are still too many, and the oldest file that has to lose rows: of a
+    closed file only as much goes as is needed. `used` are never removed or returned, nor what
+    another keeper may be writing. Raises OSError.
     """
     sizes = dict(_sizes(folder))
     excess = sum(sizes.values()) - (most - min(ROOM_LEFT, most // 16))
@@ -63,11 +67,13 @@ def make_room(folder: Path, used: Collection[Path], most: int = MOST_RECORDED) -
             break
         if path in used or (is_open_or_left(path) and _is_fresh(path)):
             continue
+        if sizes[path] > excess and DAMAGED_MARK not in path.name:
+            return excess, path
         for part in (path, *(path.with_name(path.name + side) for side in SIDE_FILES)):
             with suppress(FileNotFoundError):
                 part.unlink()
         excess -= sizes[path]
-    return excess
+    return excess, None
 
 
 def _sizes(folder: Path) -> Iterator[tuple[Path, int]]:

@@ -16,6 +16,7 @@ from tui.drive.values import to_words, word_count
 
 from ..reading import Reading
 from ..record.clock_jumps import ClockJumps
+from ..record.disk_trouble import disk_words
 from ..record.recorder import FLUSHED_EVERY
 from ..record.schema import GOOD, REFUSED, SILENT, EventRow, ReplyRow, to_microseconds
 from ..shown import Quality
@@ -159,7 +160,7 @@ class RecordingFile:
                 self._file.flush()
             self._file.write(values, [row for row in rows if isinstance(row, EventRow)])
         except OSError as error:
-            self.trouble = error.strerror or str(error)
+            self.trouble = disk_words(error)
             if self._file is not None:
                 self._file.abandon()
                 self._file = None
