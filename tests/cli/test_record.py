@@ -37,7 +37,9 @@ def test_record_has_the_words_of_the_named_codes_and_their_form(tmp_path: Path) 
     path = tmp_path / "values.sqlite"
     with tcp_line("atv71@2", "atv71@3", "--set", "ACC=123") as line:
         drives = ("-d", "2", "-d", "3")
-        text = run(0, "record", line, "ACC", "ULN", *drives, *SHORT, "--out", path, "--for", "1")
+        text = run(
+            0, "record", line, "ACC", "ULN", "acc", *drives, *SHORT, "--out", path, "--for", "1"
+        )
     found = rows(path)
     assert text == f"Recorded {len(found)} values to {path}.\n"
     assert len(found) >= 8
@@ -130,6 +132,8 @@ def test_ctrl_c_ends_the_recording_with_a_whole_file(tmp_path: Path) -> None:
         (("RFR", "--out", "-"), "it needs a FILE"),
         (("RFR", "--out", "pipe", "--force"), "pipe is not a regular file"),
         (("XYZQ", "--out", "new.sqlite"), "no parameter 'XYZQ'"),
+        (("RFR", "--out", "new.sqlite", "--trigger", "XYZQ>5"), "no parameter 'XYZQ'"),
+        (("RFR", "--out", "there.sqlite", "--force", "--trigger", "XYZQ>5"), "no parameter 'XYZQ'"),
         (("RFR", "--out", "none/new.sqlite/x"), "none"),
     ],
 )

@@ -259,6 +259,7 @@ class Recording:
         """Record until the end that was typed."""
         from tui.bus.link import label
         from tui.session.connect.recorded_line import recording_is_on
+        from tui.session.record.disk_trouble import disk_words
         from tui.session.recording.recording_file import RecordingFile, parameter_events
         from tui.session.recording.triggers import TriggeredRows, parse_trigger
 
@@ -266,24 +267,26 @@ class Recording:
         parsed = [[parse_trigger(text) for text in wish.triggers] for _ in target.each()]
         sessions = [await connect_drive(opened, each) for each in target.each()]
         check_rate(opened.line.link, wish.every, len(sessions))
-        chosen = [[item.profile.find(code).code for code in wish.codes] for item in sessions]
-        try:
+        rows = TriggeredRows(wish.before, wish.after, always=not wish.triggers)
+        drives = []
+        for session, triggers in zip(sessions, parsed, strict=True):
+            found = dict.fromkeys(session.profile.find(code).code for code in wish.codes)
+            drives.append(RecordedDrive(session, list(found), triggers, rows))
+        try:  # all that was typed is valid: only now may a file be replaced
             wish.path.unlink(missing_ok=True)
             program = opened.line.facts.me.text
             # the recorder of a real line reports them, too
             report = len if opened.is_real and recording_is_on() else _complain
             self.file = RecordingFile(wish.path, label(opened.line.link), program, report)
         except OSError as error:
-            raise Failure(f"{wish.path}: {error.strerror or error}.", USAGE) from None
+            text = f"{wish.path} cannot be written: {disk_words(error)}. Choose another place."
+            raise Failure(text, USAGE) from None
         with closing(self.file):
-            rows = TriggeredRows(wish.before, wish.after, always=not wish.triggers)
-            drives = []
-            for session, codes, triggers in zip(sessions, chosen, parsed, strict=True):
+            for drive in drives:
+                session, codes = drive.session, drive.codes
                 self.file.add(parameter_events(session, codes))
-                drive = RecordedDrive(session, codes, triggers, rows)
                 self._places += [(session.device, session.profile[code]) for code in codes]
-                drives.append(self._follow(drive))
-            await self._until_end(drives, wish)
+            await self._until_end([self._follow(drive) for drive in drives], wish)
 
     async def _until_end(
         self, drives: Sequence[Coroutine[object, object, None]], wish: RecordOptions
