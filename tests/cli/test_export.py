@@ -156,6 +156,21 @@ def test_times_before_a_trigger_are_negative(tmp_path: Path) -> None:
     assert "has no frames" in refused(2, "export", source, "--out", tmp_path / "x.pcapng")
 
 
+def test_recording_of_two_drives_has_each_value_as_it_was(tmp_path: Path) -> None:
+    # the cycle of one drive is written after that of the other, although it was read before
+    rows = [
+        records.row(second + late, CURRENT, 30 + second, device=device)
+        for second in range(10)
+        for device, late in ((2, 0.03), (1, 0.0))
+    ]
+    form = json.dumps({"code": "LCR"})
+    records.write(tmp_path, rows, [records.event(0, "parameter", form, each) for each in (1, 2)])
+    (source,) = tmp_path.glob("*.sqlite")
+    run(0, "export", source, "--out", tmp_path / "values.csv")
+    table = table_of(tmp_path / "values.csv")
+    assert (len(table), f"{LCR} min" in table[0]) == (20, False)
+
+
 REFUSED = {
     "no codes": (("LINE", "--out", "x.csv"), "Name the codes to export"),
     "unknown code": (("LINE", "NOPE", "--out", "x.csv"), "has no parameter 'NOPE'"),

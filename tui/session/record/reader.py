@@ -25,6 +25,8 @@ from .unfolding import unfold
 
 MOST_FILES = 11
 """Files that are read as one: SQLite joins no more."""
+FIRST_ROWS = 2000
+"""Rows among which the oldest one is searched."""
 ROWS_AT_A_TIME = 1000
 """Rows of one query: a longer one would keep the writer from emptying the file's log."""
 
@@ -178,11 +180,13 @@ class RecordReader:
     def first_raw(self) -> tuple[int, int] | None:
         """Return session and `mono` of the oldest read that is kept as it was; None without any.
 
-        Reads before it are only reduced.
+        Reads before it are only reduced. A file of `drivepanel record` has the rows of several
+        drives in the order of their cycles, so the oldest is among the first rows.
         """
         found = self._base.execute(
-            f"SELECT session, mono FROM reply WHERE function IN {RECORDED_READS} ORDER BY id"
-            " LIMIT 1"
+            "SELECT session, min(mono) FROM (SELECT session, mono FROM reply"
+            f" WHERE function IN {RECORDED_READS} ORDER BY id LIMIT {FIRST_ROWS})"
+            " GROUP BY session ORDER BY session LIMIT 1"
         ).fetchone()
         return None if found is None else (found[0], found[1])
 
