@@ -8,13 +8,18 @@ import signal
 import sqlite3
 import time
 from contextlib import closing
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from tests.programs import DRIVEPANEL, port_of, served, simulated
+from tests.ui import fakes
 from tui.cli.commands import record
+from tui.drive.profile import library
+from tui.session.recording.triggers import TriggeredRows
 
 from .commands import ended, run, tcp_line
 
@@ -148,6 +153,24 @@ def test_refused_recording_writes_no_file(
     assert text in done.stderr
     assert (tmp_path / "there.sqlite").read_text() == "mine"
     assert not (tmp_path / "new.sqlite").exists()
+
+
+def test_drive_that_is_lost_and_comes_back_is_reported_once_each(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    profile = library.load("atv71")
+    good = fakes.snapshot_of(profile, fakes.RUNNING)
+    lost = replace(good, error="Device 2 did not answer.")
+    drive = record.RecordedDrive(
+        Mock(device=2, profile=profile), ["RFR"], (), TriggeredRows(0, 0, always=True)
+    )
+    work = record.Recording(Mock(as_json=False), Mock())
+    for cycle in (good, lost, lost, good, good):
+        work._take(drive, cycle)
+    assert capsys.readouterr().err.splitlines() == [
+        "drivepanel: Device 2 did not answer. Still trying.",
+        "drivepanel: Device 2 is recorded again.",
+    ]
 
 
 def test_drive_that_does_not_answer_ends_with_3_and_keeps_the_file(tmp_path: Path) -> None:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from tests.programs import wait_until
+from tui.drive.profile.schema import Parameter
 from tui.session.record.reader import RecordReader
 from tui.session.record.record_file import RecordFile
 from tui.session.recording import recording_file
-from tui.session.recording.recording_file import RecordingFile
+from tui.session.recording.recording_file import RecordingFile, values_in
 from tui.session.recording.triggers import (
     CycleSeen,
     Trigger,
@@ -110,6 +113,17 @@ def test_rows_that_the_disk_refuses_are_written_later(
     with closing(RecordReader(file.path)) as reader:
         assert [item.word for item in reader.words(1, REGISTER, *EVER)] == [1, 2]
         assert sum(item.good for item in reader.reduced(1, REGISTER, *EVER)) == 2
+
+
+def test_failed_reads_are_recorded_and_count_as_no_values(tmp_path: Path) -> None:
+    file = RecordingFile(tmp_path / "values.sqlite", "serial:x", "record")
+    file.add([row_of(1, mono=1), row_of(0, mono=2, result="exception")])
+    file.close()
+    assert file.written == 1
+    place = cast("Parameter", SimpleNamespace(function=3, address=REGISTER))
+    assert values_in(file.path, [(1, place)]) == 1
+    with closing(RecordReader(file.path)) as reader:
+        assert [item.word for item in reader.words(1, REGISTER, *EVER)] == [1, None]
 
 
 def test_recording_is_flushed_in_time_for_a_power_cut(

@@ -97,6 +97,8 @@ class RecordedDrive:
     rows: TriggeredRows
     command: str = ""
     """Code of the command word."""
+    error: str = ""
+    """Why the last cycle failed; empty if it did not."""
     read: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
@@ -347,6 +349,10 @@ class Recording:
 
         assert self.file is not None
         device, readings = drive.session.device, with_text(snapshot.readings)
+        if bool(snapshot.error) != bool(drive.error):
+            again = f"Device {device} is recorded again."
+            _complain(f"{snapshot.error} Still trying." if snapshot.error else again)
+        drive.error = snapshot.error
         texts = drive.fired(snapshot)
         rows = rows_of_cycle(device, [readings[code] for code in drive.codes], snapshot.wall)
         events = [trigger_event(device, text, snapshot.wall) for text in texts]

@@ -89,7 +89,7 @@ def trigger_event(device: int, text: str, wall: float) -> EventRow:
 def values_in(path: Path, places: Sequence[tuple[int, Parameter]]) -> int:
     """Return the number of values in a recording, of each device and parameter; 0 if it is damaged.
 
-    It reads them all: what a program reports as recorded is there.
+    It reads them all: what a program reports as recorded is there. Failed reads are not counted.
     """
     import sqlite3
 
@@ -99,7 +99,10 @@ def values_in(path: Path, places: Sequence[tuple[int, Parameter]]) -> int:
     try:
         with closing(RecordReader(path)) as reader:
             return sum(
-                sum(1 for _ in reader.words(device, address, 0, _LAST, function=function))
+                sum(
+                    found.word is not None
+                    for found in reader.words(device, address, 0, _LAST, function=function)
+                )
                 for device, function, address in each
             )
     except (OSError, sqlite3.Error):
@@ -118,7 +121,7 @@ class RecordingFile:
         """Create the file; `report` gets a text for each jump of the clock. Raises OSError."""
         self.path = path
         self.written = self.lost = 0
-        """Numbers of rows of values."""
+        """Numbers of values that were written, and of rows that were lost."""
         self.trouble = ""
         """Why the last rows were not written; empty if they were."""
         self._create = partial(_created, path, line, program)
@@ -166,7 +169,7 @@ class RecordingFile:
                 self._file = None
             return rows
         self.trouble = ""
-        self.written += len(values)
+        self.written += sum(row.words is not None for row in values)
         return []
 
     def close(self) -> None:
