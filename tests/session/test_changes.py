@@ -18,6 +18,7 @@ from tui.session.changes import (
     LineLoss,
     LineRun,
     change_text,
+    entry_text,
     loss_text,
     read_changes,
     run_text,
@@ -393,6 +394,26 @@ def test_trip_of_the_record_is_listed_without_an_entry_of_the_journal(folder: Pa
     assert [seconds(time.timestamp()) for time in times] == [20, 40]
     since = datetime.fromtimestamp(START + 30, UTC)
     assert [item.answer for item in found(folder, since=since).entries] == ["reset"]
+
+
+def test_reset_while_the_drive_was_lost_has_the_seconds_that_are_not_known(folder: Path) -> None:
+    lost = [row for row in tripped(20, 40) if not START + 25 < row.utc / 1e6 < START + 39.5]
+    write(folder, lost)
+    assert [entry_text(item) for item in found(folder).entries] == [
+        "FAULT OCF Overcurrent: tripped",
+        "FAULT OCF Overcurrent: reset  (time to 15 s)",
+    ]
+    (trip,) = found(folder).trips
+    assert trip.trip.tripped
+
+
+def test_begin_of_a_record_that_does_not_reach_back_far_enough_is_reported(folder: Path) -> None:
+    write(folder, each_second(0, 5, READY))
+    begin = datetime.fromtimestamp(START, UTC)
+    (text,) = found(folder, since=begin - timedelta(hours=1)).unread
+    assert text.startswith(f"Nothing of {LINE} is recorded before 20")
+    assert found(folder, since=begin + timedelta(seconds=2)).unread == []
+    assert found(folder).unread == []
 
 
 def test_trip_that_the_journal_has_noted_is_listed_once(folder: Path) -> None:

@@ -27,12 +27,19 @@ _AGO = re.compile(r"(\d{1,9})\s*([smhdw])")
 TIME_EXAMPLES = "2h, 30m, 7d, 08:30, 2026-03-01, 2026-03-01T08:30"
 RUN_SEARCHED = 86400.0
 """Seconds before the wanted time in which the begin of a run is searched."""
+BEGIN_REPORTED_AFTER = 60.0
+"""Seconds after the wanted time from which the begin of a record is reported."""
+RECORD_BEGINS = (
+    "Nothing of {line} is recorded before {time:%Y-%m-%d %H:%M:%S}:"
+    " earlier runs and lost links are not known."
+)
 TRIP_NOTED_WITHIN = 5.0
 """Seconds between the reading of a fault and its entry in the journal, at most."""
 _END_OF_TIME = 4e9
 """A time after all records, in seconds since 1970."""
 _EXACT = 1.0
-"""Seconds up to which the times of a run count as exact."""
+"""Seconds up to which the times of a run or a trip count as exact."""
+_INEXACT = ", time to "
 
 
 class LineRun(NamedTuple):
@@ -69,7 +76,7 @@ class ChangeList:
     losses: list[LineLoss] = field(default_factory=list)
     damaged: list[DamagedLine] = field(default_factory=list)
     unread: list[str] = field(default_factory=list)
-    """Why records could not be read, with their files."""
+    """Why records could not be read, with their files, and which do not reach far enough back."""
     has_more: bool = False
     """True if the journal has entries that were not selected."""
 
@@ -174,8 +181,12 @@ def _add_record(
     line = text or record.line
     if not record.files or (keys and line_key(line) not in keys):
         return
+    from .record.history import oldest_reply
     from .record.runs import history_of, lost_lines
 
+    oldest = oldest_reply(record.files, record.profiles)
+    if begin and oldest is not None and oldest - begin > BEGIN_REPORTED_AFTER:
+        found.unread.append(RECORD_BEGINS.format(line=line, time=local_time(oldest)))
     line_losses = list(lost_lines(record))
     losses = list(line_losses)
     runs: list[RecordedRun] = []
@@ -199,17 +210,21 @@ def _add_record(
 
 def _trip_entries(line: str, trip: RecordedTrip, noted: Sequence[Entry]) -> Iterator[Entry]:
     """Yield the begin and the end of a trip as entries, unless the journal has noted them."""
-    near = TRIP_NOTED_WITHIN + (trip.within or 0.0)
     began = "seen" if trip.within is None else "tripped"
-    for answer, wall in ((began, trip.begun), ("reset", trip.ended)):
+    both = (began, trip.begun, trip.within), ("reset", trip.ended, trip.end_within)
+    for answer, wall, within in both:
+        near = TRIP_NOTED_WITHIN + (within or 0.0)
         if wall is None or any(
             (entry.answer == "reset") == (answer == "reset") and abs(_wall(entry) - wall) <= near
             for entry in noted
         ):
             continue
+        why = RECORD_SHOWS_IT
+        if within is not None and within > _EXACT:
+            why = f"{why}{_INEXACT}{within:.0f} s"
         yield Entry(
             entry_time(wall), line, trip.device, trip.profile, trip.code, 0, None, "",
-            trip.raw or 0, trip.name, answer, None, RECORD_SHOWS_IT, kind="fault",
+            trip.raw or 0, trip.name, answer, None, why, kind="fault",
         )  # fmt: skip
 
 
@@ -317,7 +332,9 @@ def entry_text(entry: Entry) -> str:
     """Return an entry without its time and drive: old and new value, answer, reason."""
     match entry.kind:
         case "fault":
-            return f"{f'FAULT {entry.code} {entry.new}'.rstrip()}: {entry.answer}"
+            _, inexact, seconds = entry.why.partition(_INEXACT)
+            note = f"  (time to {seconds})" if inexact else ""
+            return f"{f'FAULT {entry.code} {entry.new}'.rstrip()}: {entry.answer}{note}"
         case "proof":
             return f"{entry.why}: {entry.new}  {entry.answer}"
         case "reset":

@@ -85,6 +85,8 @@ class RecordedTrip(NamedTuple):
     """None if the drive was in fault when last read."""
     within: float | None
     """Seconds by which `begun` may be wrong. None: it was in fault when first read."""
+    end_within: float | None = None
+    """Seconds by which `ended` may be wrong: the drive may have been reset while it was lost."""
 
 
 class LostLink(NamedTuple):
@@ -229,8 +231,9 @@ def _trips(
         ended = None if span.end_within is None else span.ended
         name = found.name if found else ""
         yield RecordedTrip(
-            device, profile.id, raw, code, name, span.begun, ended, span.begin_within
-        )
+            device, profile.id, raw, code, name, span.begun, ended, span.begin_within,
+            span.end_within,
+        )  # fmt: skip
 
 
 def _raws(points: Iterable[HistoryPoint]) -> list[int]:
