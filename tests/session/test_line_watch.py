@@ -246,7 +246,9 @@ class Watched:
 def test_drive_that_is_kept_again_replaces_the_earlier_one(monkeypatch: pytest.MonkeyPatch) -> None:
     here = Watched(monkeypatch)
     first = here.keep()
-    assert here.done == [("keep", (1, UNKNOWN_TIMEOUT)), "learner 1", "line_watch 1"]
+    workers = ["learner 1", "line_watch 1", "identity 1"]
+    ended = [f"cancel {worker}" for worker in workers]
+    assert here.done == [("keep", (1, UNKNOWN_TIMEOUT)), *workers]
     assert (first.since, first.reader, first.watch, first.learned) == (
         100.0,
         "reader 1",
@@ -255,14 +257,11 @@ def test_drive_that_is_kept_again_replaces_the_earlier_one(monkeypatch: pytest.M
     )
     here.done.clear()
     here.keep()
-    assert here.done == [
-        "cancel learner 1", "cancel line_watch 1", ("let go", 1), ("keep", (1, UNKNOWN_TIMEOUT)),
-        "learner 1", "line_watch 1",
-    ]  # fmt: skip
+    assert here.done == [*ended, ("let go", 1), ("keep", (1, UNKNOWN_TIMEOUT)), *workers]
     here.done.clear()
     here.look()
     here.watch.stop()
-    assert here.done == ["cancel learner 1", "cancel line_watch 1", ("let go", 1)]
+    assert here.done == [*ended, ("let go", 1)]
     assert (here.watch.looks, here.watch.states) == ({}, {})
 
 

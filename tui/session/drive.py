@@ -84,10 +84,9 @@ class DriveSession:
         self.guessed = False
         """True if its family was neither named nor reported by the drive; it is then never
         reported as stopped."""
-        self.contradiction = contradiction(identity, profile)
+        self.contradiction = ""
         """Contradiction between the drive's reported identity and its profile; empty if none."""
-        if self.contradiction:
-            self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
+        self._compare()
         self.is_unconfirmed = profile.data.profile.unproved
         """True if only stops and what this site has proved are written, because its profile is
         unproved, and no person has confirmed it."""
@@ -125,6 +124,36 @@ class DriveSession:
         line.describe(device, limits_of(profile))
         self.note_profile()
         self._hear_others()
+
+    def _compare(self) -> None:
+        """Bar arming if the reported identity contradicts the profile."""
+        self.contradiction = contradiction(self.identity, self.family)
+        if self.contradiction:
+            self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
+
+    def replaced_by(self, identity: DriveIdentity) -> str:
+        """Take the identity of another drive that answers now; return it as text, empty if none.
+
+        No value of the drive before it counts any more, and nothing is written without arming.
+        """
+        before = self.known_identity
+        same_profile = bool(identity.reference) or identity.profile == before.profile
+        if identity.reference == before.reference and same_profile:
+            return ""
+        self.identity, self.arming.barred = identity, ""
+        self._compare()
+        if self.is_unconfirmed and not self.contradiction:
+            self.bar_unconfirmed()
+        another = f"Device {self.device} is another drive now: {identity.text}."
+        named = before.reference and identity.reference  # else it did not identify itself before
+        text = self.contradiction or (another if named else "")
+        if not text:
+            return ""
+        self.arming.disarm(text)
+        self.commanded_at = None  # that was the other one
+        self.image.forget()
+        self.request_full_read()
+        return text
 
     def bar_unconfirmed(self) -> None:
         """Allow arming, unless the profile is unproved, not confirmed, and its commands are not

@@ -45,6 +45,7 @@ log = logging.getLogger(__name__)
 PROGRAM_ENDS_WITHIN = 0.3
 """Seconds after which the process of a program that has left the line no longer exists."""
 
+SCAN_AGAIN = "Its values may be wrong, and it is not armed. Press s on Line to scan again."
 HALF_SENT = "Drive Panel, after half of a command"
 """Source of a stop after a command of several words that ended before its last one."""
 
@@ -91,6 +92,7 @@ class Fleet:
         self.starts = starts
         """Records of motor starts; None if they are not kept."""
         self.line_watch = LineWatch(line)
+        self.line_watch.on_identified = self._note_identity
         self._strangers = UnknownDrivePoller(line)
         self.health = LineHealth()
         self.events = events or EventLog(clock.wall)
@@ -172,6 +174,15 @@ class Fleet:
             with suppress(LineClosed):
                 self.stop([session])
         return console
+
+    def _note_identity(self, session: DriveSession, identity: DriveIdentity) -> None:
+        """Take the identity of a drive that was gone; report another one. Reads files."""
+        console, text = self.console(session.device), session.replaced_by(identity)
+        if not text or console is None or console.session is not session:
+            return
+        self._put(FoundDrive(identity, console))
+        self._recall(console)  # a stop is prepared for its own family
+        self.events.add("failed", f"{text} {SCAN_AGAIN}", session.device)
 
     def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
         """Return True if a drive gets another family while its motor may run, and report that."""

@@ -24,6 +24,7 @@ from tui.drive.profile.schema import Quantity
 from tui.drive.shown import number_of
 from tui.safety import READS_PER_TIMEOUT, WARNED_AT_SHARE
 
+from ..connect.identify import DriveIdentity
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.order_check import check_byte_order
@@ -33,6 +34,7 @@ from ..reading import reading_of
 from ..shown import Shown
 from ..timeout_report import TimeoutWatch
 from .alarms import FaultOnsets
+from .identity_watch import IdentityWatch
 from .look import Look, last_that_brought
 from .monitor import Monitor
 from .timeout import TimeoutWarning, has_begun, read_timeout
@@ -134,6 +136,8 @@ class LineWatch:
         self.onsets = FaultOnsets()
         self.least_period = GLANCE
         """Least seconds between two checks of a drive without a running monitor."""
+        self.on_identified: Callable[[DriveSession, DriveIdentity], None] = lambda *_: None
+        """Gets the identity of a drive that answers again, in a thread."""
         self.recorded: dict[int, RecordedChecks] = {}
         """By device, in a replay: its curves have these instead of its own checks."""
 
@@ -249,11 +253,12 @@ class LineWatch:
             self._kept = {**self._kept, device: kept}
             # before the timeout is known, too: reads of missing words may take seconds
             self._keep_alive(kept, UNKNOWN_TIMEOUT)
-        learn = partial(self._again, kept, self._learn)
+        identity = IdentityWatch(session, self.on_identified)
         glance = partial(self._again, kept, self._glance, early=True)
         kept.workers = (
-            self._line.spawn(learn, f"learner {device}"),
+            self._line.spawn(partial(self._again, kept, self._learn), f"learner {device}"),
             self._line.spawn(glance, f"line_watch {device}"),
+            self._line.spawn(lambda: self._again(kept, identity.step), f"identity {device}"),
         )
 
     def recall(self, device: int, look: Look) -> None:
