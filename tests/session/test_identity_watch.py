@@ -15,7 +15,7 @@ from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.fleet import SCAN_AGAIN, Fleet
 from tui.session.journal import Journal
-from tui.session.monitor.identity_watch import AGAIN_AFTER, CHECK_INTERVAL, IdentityWatch
+from tui.session.monitor.identity_watch import CHECK_INTERVAL, DAMAGED_AGAIN_AFTER, IdentityWatch
 
 ATV71, OTHER_ATV71, ATV312 = "ATV71HU15M3", "ATV71HU75N4", "ATV312HU09M3"
 ETA = library.load("atv71")["ETA"].address
@@ -135,7 +135,7 @@ async def test_damaged_identification_is_requested_again_later() -> None:
     made.line.fail_identify(1, ChecksumFault(1, 43, 0), times=20)
     made.line.become(LineStatus.CONNECTED)
     await made.line.read(1, ETA)
-    assert await made.watch.step() == AGAIN_AFTER
+    assert await made.watch.step() == DAMAGED_AGAIN_AFTER
     made.line.fail_identify(1, ChecksumFault(1, 43, 0), times=0)
     before = made.identified
     assert await made.watch.step() == CHECK_INTERVAL

@@ -15,7 +15,7 @@ from ..drive import DriveSession
 GONE_FOR = 2.0
 """Seconds without an answer from which on another drive may have been connected."""
 CHECK_INTERVAL = 0.3
-AGAIN_AFTER = 3.0
+DAMAGED_AGAIN_AFTER = 3.0
 """Seconds to the next attempt if the reply was damaged."""
 
 
@@ -47,7 +47,7 @@ class IdentityWatch:
             try:
                 identity = await own_words(line, session.device, session.family)
             except (ChecksumFault, WrongReply):
-                return AGAIN_AFTER
+                return DAMAGED_AGAIN_AFTER
             self._was_gone = False
             if identity is not None:
                 await asyncio.to_thread(self._found, session, identity)
