@@ -416,5 +416,5 @@ def test_standstill_by_a_guessed_profile_proves_nothing(
 ) -> None:
     here = OneStop(Ramp(OwnTime(), 0.0), journal)
     here.session.guessed, here.stop.wanted = guessed, "quick-stop"
-    here.stop._tell_standing()
+    here.stop._tell_standing("ready", 0.0)
     assert here.reports == [(phase, text, 1000.0)]

@@ -10,7 +10,9 @@ from tests.waiting import until
 from tui.drive.orders import nearest_stop
 from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
+from tui.session.command.stop_report import MAY_COAST, OVER
 from tui.session.events import EventLog
+from tui.session.read.reader import Reader
 
 from .test_owners import bench
 from .test_stop import FAMILIES
@@ -31,6 +33,34 @@ def test_coasting_word_never_replaces_another() -> None:
     chart = library.load("varmeca").data.charts[0]
     assert nearest_stop(chart, "freewheel") == "freewheel"
     assert nearest_stop(chart, "dc-braking") == "dc-braking"
+
+
+@pytest.mark.parametrize("run_hz", [20.0, 0.0])
+async def test_motor_that_nothing_brakes_is_not_reported_as_stopped(run_hz: float) -> None:
+    """Its output frequency is 0 at once, and its speed is not known."""
+    async with bench("atv71", run_hz=run_hz) as here:
+        await until(lambda: here.drive.motor.frequency >= run_hz / 2)
+        frequency = here.session.profile.quantity("output_frequency")
+        assert frequency is not None
+        await Reader(here.session).read([frequency.code])
+        here.fleet.stop([here.session], "freewheel")
+        await until(lambda: here.fleet.stopper.reports[1].phase in OVER)
+        report = here.fleet.stopper.reports[1]
+        assert report.text == (MAY_COAST if run_hz else "stopped")
+        if run_hz:
+            assert abs(here.drive.motor.rotor) > 1
+            assert here.fleet.events.newest is not None
+            assert here.fleet.events.newest.text == f"The motor is {MAY_COAST}."
+
+
+async def test_motor_that_trips_on_the_ramp_of_its_stop_is_not_reported_as_stopped() -> None:
+    async with bench("atv71", run_hz=40.0) as here:
+        await until(lambda: here.drive.motor.frequency > 35)
+        here.fleet.stop([here.session])
+        await until(lambda: here.drive.motor.frequency < 34)
+        here.drive.provoke("OCF")
+        await until(lambda: here.fleet.stopper.reports[1].phase in OVER)
+        assert here.fleet.stopper.reports[1].text == MAY_COAST
 
 
 async def test_missing_emergency_stop_becomes_a_reported_quick_stop() -> None:

@@ -11,7 +11,7 @@ from tui.bus.api import DeviceCounters, LineStatus
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.safety import WARNED_AT_SHARE
-from tui.session.command.stop_report import NOT_STOPPED, NOT_STOPPING, Phase, StopReport
+from tui.session.command.stop_report import MAY_COAST, NOT_STOPPED, NOT_STOPPING, Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.monitor.line_health import LEAST_REPLIES, POOR
 from tui.widgets.drawing import short, wrapped
@@ -93,7 +93,9 @@ def _stop(report: StopReport, width: int) -> tuple[Text, list[Text]]:
     words, style = HEADS[report.phase]
     text = report.text.removeprefix(NOT_STOPPED)
     if report.phase is Phase.STOPPED:
-        text = "by the stop key"
+        coasts = text.startswith(MAY_COAST)
+        words = "NO CURRENT" if coasts else words
+        text = "The motor may still coast." if coasts else "by the stop key"
     most = MORE_ROWS if report.phase in NOT_STOPPING else 2
     return Text(words, style), [Text(line, PLAIN) for line in wrapped(text, width, most)]
 

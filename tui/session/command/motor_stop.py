@@ -35,7 +35,7 @@ from ..reading import Reading
 from ..settings.write import Writer
 from .first_stop import stop_first, unlike_families
 from .last_known import last_known_stop, run_by_others
-from .stop_report import Phase, not_proved, not_stopped
+from .stop_report import MAY_COAST, Phase, not_proved, not_stopped
 
 log = logging.getLogger(__name__)
 
@@ -104,10 +104,15 @@ class MotorStop:
     held: dict[str, Reading] = field(default_factory=dict)
     """Command words before the stop, because their option bits are kept."""
     _unheeded: bool = False
+    _turned: bool | None = field(init=False)
+    """True if the last known frequency before the stop is not 0; None if it is not known."""
 
     def __post_init__(self) -> None:
         self.reader = Reader(self.session)
         self.wanted = self.order
+        frequency = self.session.profile.quantity("output_frequency")
+        held = self.session.image.get(frequency.code) if frequency else None
+        self._turned = None if held is None or held.raw is None else held.raw != 0
 
     async def carry_out(self) -> str | None:
         """Select the words, send them, and follow the motor; return why it does not stop."""
@@ -269,7 +274,7 @@ class MotorStop:
             unknown = hertz is None
             # a motor that slows down with an unknown frequency is not known to stand
             if not hertz and kind in STANDING and (hertz == 0 or kind != "stopping"):
-                self._tell_standing()
+                self._tell_standing(kind, before)
                 self.session.request_full_read()
                 return None
             if hertz == 0 and kind == "running" and ending is not None:
@@ -295,13 +300,22 @@ class MotorStop:
             await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
         return STANDSTILL_UNKNOWN if unknown else STILL_TURNS
 
-    def _tell_standing(self) -> None:
-        """Report standstill; with a guessed profile, the values prove nothing."""
+    def _tell_standing(self, kind: str, before: float | None) -> None:
+        """Report standstill; with a guessed profile, the values prove nothing.
+
+        `before` is the frequency in Hz at the read before, None if the first read is this one.
+        """
         session = self.session
         if session.guessed:
             self.say(session, Phase.FAILED, not_proved(session.profile.name), self.ordered)
         else:
-            self.say(session, Phase.STOPPED, self._with_way("stopped"), self.ordered)
+            turned = self._turned if before is None else before != 0
+            # not known: it may turn when it is left to coast; a fault may be an old one
+            coasts = (
+                turned is not False if self.order == "freewheel" else kind == "fault" and turned
+            )
+            text = MAY_COAST if coasts else "stopped"
+            self.say(session, Phase.STOPPED, self._with_way(text), self.ordered)
 
     def _with_way(self, progress: str) -> str:
         return with_other_way(progress, self.wanted, self.order)

@@ -33,6 +33,10 @@ def not_proved(read_as: str = "") -> str:
     return NOT_PROVED.format(f" Read as {read_as}, it is at standstill." if read_as else "")
 
 
+MAY_COAST = "without current, and may still coast"
+"""Text of a motor at 0 Hz that nothing brakes, if it turned before: its speed is not known."""
+
+
 class Phase(StrEnum):
     """Progress of a stop."""
 
@@ -71,7 +75,7 @@ class StopReport(NamedTuple):
     phase: Phase
     text: str
     """If stopping, the command and the frequency. If stopped, a state: `stopped`, and in brackets
-    the kind of stop that the drive lacks. Otherwise sentences."""
+    the kind of stop that the drive lacks, or MAY_COAST. Otherwise sentences."""
     time: float
     since: float
 
