@@ -12,7 +12,7 @@ from tui.bus.errors import ChecksumFault
 from tui.bus.fake import FakeLine
 from tui.drive.profile import library
 from tui.session.connect.identify import DriveIdentity
-from tui.session.drive import DriveSession
+from tui.session.drive import DriveSession, replaced_by
 from tui.session.fleet import SCAN_AGAIN, Fleet
 from tui.session.journal import Journal
 from tui.session.monitor.identity_watch import CHECK_INTERVAL, DAMAGED_AGAIN_AFTER, IdentityWatch
@@ -105,7 +105,7 @@ def test_identity_that_is_only_read_in_another_way_replaces_no_drive(
     )
     session = DriveSession(FakeLine({1: {}}), 1, library.load("atv71"), known)
     session.arming.arm()
-    assert session.replaced_by(found) == ""
+    assert replaced_by(session, found) == ""
     assert session.arming.armed
 
 

@@ -86,7 +86,7 @@ class DriveSession:
         reported as stopped."""
         self.contradiction = ""
         """Contradiction between the drive's reported identity and its profile; empty if none."""
-        self._compare()
+        compare_identity(self)
         self.is_unconfirmed = profile.data.profile.unproved
         """True if only stops and what this site has proved are written, because its profile is
         unproved, and no person has confirmed it."""
@@ -124,36 +124,6 @@ class DriveSession:
         line.describe(device, limits_of(profile))
         self.note_profile()
         self._hear_others()
-
-    def _compare(self) -> None:
-        """Bar arming if the reported identity contradicts the profile."""
-        self.contradiction = contradiction(self.identity, self.family)
-        if self.contradiction:
-            self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
-
-    def replaced_by(self, identity: DriveIdentity) -> str:
-        """Take the identity of another drive that answers now; return it as text, empty if none.
-
-        No value of the drive before it counts any more, and nothing is written without arming.
-        """
-        before = self.known_identity
-        same_profile = bool(identity.reference) or identity.profile == before.profile
-        if identity.reference == before.reference and same_profile:
-            return ""
-        self.identity, self.arming.barred = identity, ""
-        self._compare()
-        if self.is_unconfirmed and not self.contradiction:
-            self.bar_unconfirmed()
-        another = f"Device {self.device} is another drive now: {identity.text}."
-        named = before.reference and identity.reference  # else it did not identify itself before
-        text = self.contradiction or (another if named else "")
-        if not text:
-            return ""
-        self.arming.disarm(text)
-        self.commanded_at = None  # that was the other one
-        self.image.forget()
-        self.request_full_read()
-        return text
 
     def bar_unconfirmed(self) -> None:
         """Allow arming, unless the profile is unproved, not confirmed, and its commands are not
@@ -273,6 +243,37 @@ class DriveSession:
         if fault and self.image.age(fault) > longest:
             raws = {code: raw for code, raw in raws.items() if code != fault}
         return read_chart(self.profile, raws)
+
+
+def compare_identity(session: DriveSession) -> None:
+    """Bar arming if the reported identity contradicts the profile."""
+    session.contradiction = contradiction(session.identity, session.family)
+    if session.contradiction:
+        session.arming.barred = f"Not armed: {session.contradiction} {OWN_PROFILE}"
+
+
+def replaced_by(session: DriveSession, identity: DriveIdentity) -> str:
+    """Take the identity of another drive that answers now; return it as text, empty if none.
+
+    No value of the drive before it counts any more, and nothing is written without arming.
+    """
+    before = session.known_identity
+    same_profile = bool(identity.reference) or identity.profile == before.profile
+    if identity.reference == before.reference and same_profile:
+        return ""
+    session.identity, session.arming.barred = identity, ""
+    compare_identity(session)
+    if session.is_unconfirmed and not session.contradiction:
+        session.bar_unconfirmed()
+    named = before.reference and identity.reference  # else it did not identify itself before
+    another = f"Device {session.device} is another drive now: {identity.text}."
+    text = session.contradiction or (another if named else "")
+    if text:
+        session.arming.disarm(text)
+        session.commanded_at = None  # that was the other one
+        session.image.forget()
+        session.request_full_read()
+    return text
 
 
 class UnsavedSettings:

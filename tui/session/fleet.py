@@ -26,7 +26,7 @@ from .command.stop import Stopper
 from .connect.identify import DriveIdentity
 from .connect.search import Search
 from .console import DriveConsole
-from .drive import DriveSession, prepared_stop
+from .drive import DriveSession, prepared_stop, replaced_by
 from .event_notes import EventNotes
 from .events import EventLog
 from .journal import FAULT_WHYS, Entry, Journal, entry_time
@@ -177,7 +177,7 @@ class Fleet:
 
     def _note_identity(self, session: DriveSession, identity: DriveIdentity) -> None:
         """Take the identity of a drive that was gone; report another one. Reads files."""
-        console, text = self.console(session.device), session.replaced_by(identity)
+        console, text = self.console(session.device), replaced_by(session, identity)
         if not text or console is None or console.session is not session:
             return
         self._put(FoundDrive(identity, console))

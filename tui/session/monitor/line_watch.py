@@ -137,7 +137,6 @@ class LineWatch:
         self.least_period = GLANCE
         """Least seconds between two checks of a drive without a running monitor."""
         self.on_identified: Callable[[DriveSession, DriveIdentity], None] = lambda *_: None
-        """Gets the identity of a drive that answers again, in a thread."""
         self.recorded: dict[int, RecordedChecks] = {}
         """By device, in a replay: its curves have these instead of its own checks."""
 
@@ -253,12 +252,11 @@ class LineWatch:
             self._kept = {**self._kept, device: kept}
             # before the timeout is known, too: reads of missing words may take seconds
             self._keep_alive(kept, UNKNOWN_TIMEOUT)
-        identity = IdentityWatch(session, self.on_identified)
-        glance = partial(self._again, kept, self._glance, early=True)
+        again, identity = partial(self._again, kept), IdentityWatch(session, self.on_identified)
         kept.workers = (
-            self._line.spawn(partial(self._again, kept, self._learn), f"learner {device}"),
-            self._line.spawn(glance, f"line_watch {device}"),
-            self._line.spawn(lambda: self._again(kept, identity.step), f"identity {device}"),
+            self._line.spawn(partial(again, self._learn), f"learner {device}"),
+            self._line.spawn(partial(again, self._glance, early=True), f"line_watch {device}"),
+            self._line.spawn(partial(again, identity.step), f"identity {device}"),
         )
 
     def recall(self, device: int, look: Look) -> None:
