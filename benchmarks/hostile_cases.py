@@ -277,7 +277,8 @@ def _put(path: Path, text: bytes, chance: random.Random) -> None:
 
 
 def _read_state(folder: Path, taught: Any) -> None:
-    from tui.cli.commands.journal import JournalEntryField, change_line
+    from tui.cli.commands.journal import change_line
+    from tui.cli.documents.journal_documents import JournalEntryField
     from tui.cli.shared.output import json_text
     from tui.cli.shared.say import printable
     from tui.screens.keys import first_keys

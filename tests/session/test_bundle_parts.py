@@ -113,7 +113,7 @@ async def test_nothing_is_sent_to_a_drive_if_its_diagnosis_sends_nothing() -> No
         trouble=None,
         devices=(2,),
         open_drive=opened,
-        documents=DriveDocuments(lambda *_: {"why": True}, lambda *_: {}),
+        documents=DriveDocuments(lambda *_: {"why": True}, lambda *_: {}, lambda *_: {}),
         expected_profile=lambda _: None,
     )
     why, *others = await collect_parts([*drive_parts(subject, 2)])

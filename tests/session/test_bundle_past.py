@@ -33,7 +33,7 @@ def subject_of(text: str) -> BundleSubject:
         trouble=None,
         devices=(1,),
         open_drive=nothing,  # type: ignore[arg-type]
-        documents=DriveDocuments(dict, dict),  # type: ignore[arg-type]
+        documents=DriveDocuments(dict, dict, dict),  # type: ignore[arg-type]
         expected_profile=lambda _: None,
     )
 

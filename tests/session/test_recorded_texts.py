@@ -13,6 +13,7 @@ from itertools import combinations, islice, product
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 
 from tests.drive.test_whole_files import HEAD, OWN_SET
@@ -22,6 +23,7 @@ from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefus
 from tui.bus.link import SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.ports import PortSeen
+from tui.cli.shared.diagnosis_documents import changes_document
 from tui.drive.profile import library
 from tui.session import changes
 from tui.session.bundle.redaction import Names, Redaction, is_address
@@ -136,8 +138,9 @@ def past() -> Iterator[str]:
     found = changes.ChangeList(ENTRIES, [changes.LineRun("a", run)])
     found.losses += [changes.LineLoss("a", loss) for loss in losses[:2]]
     yield f"{[changes.change_text(change) for change in found.in_order]}"
-    for key, rows in changes.changes_fields(found).items():
-        yield f"{key}: {rows}"
+    document = changes_document("journal.jsonl", found)
+    for key in ("entries", "damaged", "trips", "runs", "lost", "unread"):
+        yield f"{key}: {msgspec.to_builtins(getattr(document, key))}"
     now = datetime.fromtimestamp(NOON).astimezone()
     for text in ("10s", "5 m", "5m", "2h", "3d", "1w", "8:00", "13:30", "08:00:01", "24:00",
                  "2026-01-01", "2026-01-01 10:00", "x", "", "99999999999d"):  # fmt: skip

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from datetime import UTC, datetime, time, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 from .connect.line_key import line_key
 from .journal import RECORD_SHOWS_IT, Entry, Journal, entry_time
@@ -262,67 +262,6 @@ def device_of(change: Change) -> int | None:
             return loss.device
         case _:
             return change.device
-
-
-# Fields of JSON, as `drivepanel journal --json` has them
-
-
-def changes_fields(changes: ChangeList) -> dict[str, Any]:
-    """Return the parts of changes as JSON has them; times are local, to the millisecond."""
-    return {
-        "entries": [asdict(entry) for entry in changes.entries],
-        "damaged": [
-            {"file": str(line.file), "line": line.number, "text": line.text}
-            for line in changes.damaged
-        ],
-        "trips": [_trip_fields(item) for item in changes.trips],
-        "runs": [_run_fields(item) for item in changes.runs],
-        "lost": [_loss_fields(item) for item in changes.losses],
-        "unread": changes.unread,
-    }
-
-
-def _trip_fields(found: DriveTrip) -> dict[str, Any]:
-    trip = found.trip
-    return {
-        "line": found.line,
-        "device": found.device,
-        "code": trip.code,
-        "name": trip.name,
-        "seen": trip.seen,
-        "tripped": trip.tripped or None,
-        "reset": trip.reset or None,
-    }
-
-
-def _run_fields(found: LineRun) -> dict[str, Any]:
-    run = found.run
-    return {
-        "line": found.line,
-        "device": run.device,
-        "profile": run.profile,
-        "begun": entry_time(run.begun),
-        "ended": entry_time(run.ended),
-        "begin_seen": run.begin_within is not None,
-        "end_seen": run.end_within is not None,
-        "within": round(max(run.begin_within or 0.0, run.end_within or 0.0), 3),
-        "direction": run.direction or None,
-        "reference": run.reference or None,
-        "least": run.least or None,
-        "most": run.most or None,
-        "who": run.who or None,
-    }
-
-
-def _loss_fields(found: LineLoss) -> dict[str, Any]:
-    loss = found.loss
-    return {
-        "line": found.line,
-        "device": loss.device,
-        "begun": entry_time(loss.begun),
-        "ended": None if loss.ended is None else entry_time(loss.ended),
-        "reason": loss.reason,
-    }
 
 
 # Texts

@@ -1,15 +1,16 @@
-"""JSON documents of `why` and `counters` about one drive, for these commands and for a bundle."""
+"""JSON documents of `why`, `counters` and `journal`, for these commands and for a bundle."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, cast
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 from .output import drive_fields, last_minute_field
 
 if TYPE_CHECKING:
     from tui.bus.api import DeviceCounters
     from tui.session.bundle.subject import DriveDocuments
+    from tui.session.changes import ChangeList
     from tui.session.counters.watch import CountersNow
     from tui.session.diagnosis.diagnosis import Diagnosis
     from tui.session.drive import DriveSession
@@ -21,14 +22,15 @@ if TYPE_CHECKING:
         MeasuredReads,
         WhyDocument,
     )
+    from ..documents.journal_documents import JournalDocument
     from ..documents.parts import OurCountersField
 
 
 def drive_documents() -> DriveDocuments:
-    """Return the JSON documents of both commands."""
+    """Return the JSON documents of the commands."""
     from tui.session.bundle.subject import DriveDocuments
 
-    return DriveDocuments(_why, _counters)
+    return DriveDocuments(_why, _counters, _journal)
 
 
 def _why(line: str, device: int, session: DriveSession | None, found: Diagnosis) -> dict[str, Any]:
@@ -43,6 +45,10 @@ def _counters(
     return _as_object(
         counters_document(fields, found, sent["frames"], sent["answered"], reset=False)
     )
+
+
+def _journal(journal: str, found: ChangeList) -> dict[str, Any]:
+    return _as_object(changes_document(journal, found))
 
 
 def _as_object(document: Document) -> dict[str, Any]:
@@ -185,4 +191,72 @@ def _ours_field(ours: DeviceCounters) -> OurCountersField:
             TurnaroundField(up_to_ms=bar.up_to_ms, count=bar.count)
             for bar in bars(ours.turnarounds)
         ],
+    )
+
+
+def changes_document(journal: str, found: ChangeList) -> JournalDocument:
+    """Changes as a document; times are local, to the millisecond. `journal` is its file."""
+    from dataclasses import asdict
+
+    from tui.session.journal import entry_time
+
+    from ..documents.journal_documents import (
+        DamagedLineField,
+        JournalDocument,
+        JournalEntryField,
+        LostLinkField,
+        RunField,
+        TripField,
+    )
+
+    return JournalDocument(
+        journal=journal,
+        entries=[JournalEntryField(**asdict(entry)) for entry in found.entries],
+        damaged=[
+            DamagedLineField(file=str(line.file), line=line.number, text=line.text)
+            for line in found.damaged
+        ],
+        trips=[
+            TripField(
+                line=item.line,
+                device=item.device,
+                code=item.trip.code,
+                name=item.trip.name,
+                seen=item.trip.seen,
+                tripped=item.trip.tripped or None,
+                reset=item.trip.reset or None,
+            )
+            for item in found.trips
+        ],
+        runs=[
+            RunField(
+                line=item.line,
+                device=run.device,
+                profile=run.profile,
+                begun=entry_time(run.begun),
+                ended=entry_time(run.ended),
+                begin_seen=run.begin_within is not None,
+                end_seen=run.end_within is not None,
+                within=round(max(run.begin_within or 0.0, run.end_within or 0.0), 3),
+                direction=cast(Literal["forward", "reverse"] | None, run.direction or None),
+                reference=run.reference or None,
+                least=run.least or None,
+                most=run.most or None,
+                who=run.who or None,
+            )
+            for item in found.runs
+            for run in (item.run,)
+        ],
+        lost=[
+            LostLinkField(
+                line=item.line,
+                device=loss.device,
+                begun=entry_time(loss.begun),
+                ended=None if loss.ended is None else entry_time(loss.ended),
+                reason=loss.reason,
+            )
+            for item in found.losses
+            for loss in (item.loss,)
+        ],
+        unread=found.unread,
     )

@@ -22,7 +22,7 @@ from tui.bus.transport.ports import list_ports, see_port
 from tui.drive.profile import library
 from tui.drive.small_file import open_regular, read_small_text
 
-from ..changes import changes_fields, read_changes
+from ..changes import read_changes
 from ..connect.known_lines import line_name, load_memory
 from ..connect.share_place import owners
 from ..journal import Journal
@@ -34,7 +34,6 @@ from .subject import BundleSubject
 
 LOG_MOST = 2_000_000
 """Maximum bytes of the log in a bundle, taken from its end."""
-JSON_SCHEMA_OF_JOURNAL = 1
 SYSTEM_DRIVER = "/sys/class/tty/{}/device/driver"
 
 
@@ -166,14 +165,7 @@ def _versions_file() -> PartFile:
 def _journal_file(subject: BundleSubject) -> PartFile:
     texts = {subject.text} | ({label(subject.link)} if subject.link is not None else set())
     found = read_changes(record_folder(), lines=sorted(texts), since=subject.since)
-    return PartFile(
-        {
-            "schema": JSON_SCHEMA_OF_JOURNAL,
-            "command": "journal",
-            "journal": str(Journal().path),
-            **changes_fields(found),
-        }
-    )
+    return PartFile(subject.documents.journal(str(Journal().path), found))
 
 
 def _profiles_file(subject: BundleSubject) -> PartFile:

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from tui.bus.link import Link
     from tui.drive.profile.profile import Profile
 
+    from ..changes import ChangeList
     from ..connect.open_line import OpenLine
     from ..counters.watch import CountersNow
     from ..diagnosis.diagnosis import Diagnosis
@@ -33,10 +34,11 @@ OpensDrive = Callable[[int], Awaitable["DriveSession"]]
 
 
 class DriveDocuments(NamedTuple):
-    """JSON documents of the commands `why` and `counters`; `None` is a drive without session."""
+    """JSON documents of the commands with these names; `None` is a drive without session."""
 
     why: Callable[[str, int, DriveSession | None, Diagnosis], dict[str, Any]]
     counters: Callable[[str, DriveSession, CountersNow, Mapping[str, int]], dict[str, Any]]
+    journal: Callable[[str, ChangeList], dict[str, Any]]
 
 
 @dataclass(eq=False)
