@@ -42,7 +42,7 @@ Cell = tuple[str, str]
 class Terminal:
     """As much of a terminal as the panel's updates need: places, colors, characters.
 
-    With `wide`, it draws lines in two cells, as terminals for East Asian languages can.
+    With `wide`, it draws a symbol in two cells, as terminals for East Asian languages can.
     """
 
     def __init__(self, *, wide: bool = False) -> None:
@@ -98,7 +98,7 @@ class Terminal:
                 assert 0 < self._x < COLUMNS
                 self._x -= 1
             else:
-                width = get_character_cell_size(character) * (1 + (self._wide and character == "─"))
+                width = get_character_cell_size(character) * (1 + (self._wide and character == "▶"))
                 if not width:
                     before, color = self.cells[self._y, self._x - 1]
                     self.cells[self._y, self._x - 1] = (before + character, color)
@@ -347,7 +347,7 @@ def test_random_rows_on_a_terminal_whose_cursor_others_move(seed: int) -> None:
 def test_column_after_a_symbol_is_set_where_symbols_may_take_two_cells() -> None:
     terminal, picture = Terminal(wide=True), Picture()
     shown_on(terminal, picture, f"{'':>20}1")
-    shown_on(terminal, picture, f"─{'':>19}2")
+    shown_on(terminal, picture, f"▶{'':>19}2")
     assert terminal.cells[0, 20][0] == "2"
 
 

@@ -23,6 +23,7 @@ from tui.screens.monitor.curves import clock_text, curve_lines
 from tui.screens.monitor.time_axis import MARK_SIGNS
 from tui.screens.monitor.time_cursor import TimeCursor
 from tui.screens.monitor.view import View
+from tui.session.command.stop_report import Phase, StopReport
 from tui.session.monitor.trend import TREND_MARKS, TrendMark, TrendPoint
 from tui.widgets.curve import (
     ASCII_SIGNS,
@@ -373,14 +374,46 @@ def test_low_bandwidth_link_gets_no_grid() -> None:
     assert dots[1] == 0
 
 
-def test_low_bandwidth_link_gets_marks_on_the_axis_only() -> None:
+def test_low_bandwidth_link_gets_marks_on_the_axis_only_and_no_reference() -> None:
+    """Lines, names and a second curve would be sent again when the page turns."""
     room, base = arrange(80, 24, 9, lean=True), running_view(1000.0, 30.0)
-    trend = [*base.trend[:-1], replace(base.trend[-1], mark="trip")]
-    drawn = {}
-    for lean in (False, True):
-        rows = curve_lines(replace(base, trend=tuple(trend), lean=lean), room)
-        drawn[lean] = [sum(sign in row.plain for row in rows) for sign in ("┆", "■ trip")]
-    assert drawn == {False: [room.plot - 2, 1], True: [0, 1]}
+    trend = (*base.trend[:-1], replace(base.trend[-1], mark="trip"))
+    usual, slow = (
+        curve_lines(replace(base, trend=trend, lean=lean), room) for lean in (False, True)
+    )
+    assert sum("┆" in row.plain for row in usual) == room.plot - 2
+    assert not any("┆" in row.plain for row in slow)
+    assert "■ trip" in usual[-2].plain
+    assert "■ trip" not in slow[-2].plain
+    assert "■" in slow[-2].plain
+    assert "■ trip" in slow[0].plain
+    assert "reference" in usual[0].plain
+    assert "reference" not in slow[0].plain
+
+
+def test_heading_of_a_low_bandwidth_link_has_room_for_the_names_of_few_marks() -> None:
+    for width in (60, 80, 120):
+        room, base = arrange(width, 24, 9, lean=True), running_view(1000.0, 30.0)
+        for count in range(1, width // 24 + 1):
+            marks = dict(zip(range(0, 60, 8), TREND_MARKS[-count:], strict=False))
+            points = [replace(p, mark=marks.get(n, "")) for n, p in enumerate(base.trend)]
+            rows = curve_lines(replace(base, trend=tuple(points), lean=True), room)
+            text = "\n".join(row.plain for row in rows)
+            assert [name for name in marks.values() if MARK_SIGNS[name][2] not in text] == []
+
+
+def test_low_bandwidth_link_gets_the_state_alone_before_the_first_values() -> None:
+    room, base = arrange(80, 24, 9, lean=True), view_of(ATV71, fakes.RUNNING)
+    waiting = replace(base, snapshot=None, lean=True)
+    drawn = {
+        place: [row.plain.strip() for row in rows if row.plain.strip()]
+        for place, rows in monitor_parts(waiting, room, watched_words(ATV71)).items()
+    }
+    assert drawn.pop("state") == ["waiting for values"]
+    assert not any(drawn.values())
+    stopped = replace(waiting, stop=StopReport(1, Phase.FAILED, "no answer.", 0.0, 0.0))
+    rows = monitor_parts(stopped, room, watched_words(ATV71))["state"]
+    assert any("no answer" in row.plain for row in rows)
 
 
 def test_no_axis_is_drawn_before_the_first_value() -> None:

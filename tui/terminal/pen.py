@@ -215,12 +215,11 @@ def move_by(count: int, forward: str, back: str) -> str:
 
 
 def has_known_width(text: str) -> bool:
-    """Return True if every terminal draws a character in one cell.
+    """Return True if terminals draw a character in one cell: ASCII, lines, blocks and braille.
 
-    Terminals for East Asian languages draw symbols, lines and arrows in two cells if so set. After
-    one of those, the column is set again instead of being counted.
+    Some draw other symbols in two cells. After one of those, the column is set, not counted.
     """
-    return text.isascii() or "\u2800" <= text <= "\u28ff"
+    return text.isascii() or "\u2500" <= text <= "\u259f" or "\u2800" <= text <= "\u28ff"
 
 
 def _color_of(run: Run) -> str:

@@ -228,6 +228,11 @@ def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> 
     Each part has exactly its number of rows; a notice may add some to the message.
     """
     lead = [Text("")] * room.lead
+    if view.lean and view.snapshot is None and view.stop is None:
+        # frames of nothing would delay the first values on a slow link
+        waits = [*lead, Text(" ").append_text(state_lines(view, room.state_width - 4)[0])]
+        rest = {place: [Text("")] for place in ("readouts", "motor", "curve")}
+        return {**rest, "state": waits, "message": [Text("")] * room.bottom}
     readouts = readout_lines(view, room.width - room.state_width - 1, wide=room.third)
     return {
         "readouts": lead + readouts,

@@ -61,6 +61,10 @@ READ_OUT_WHOLE = 74
 """Columns from which the values at the cursor have their whole names."""
 
 
+HEADING_MARK_CELLS = 24
+"""Cells of the heading for each mark that it names on a slow link: a third of them are free."""
+
+
 class Band(NamedTuple):
     """One quantity with its own vertical axis."""
 
@@ -93,7 +97,9 @@ def curve_lines(view: View, room: Arrangement) -> list[Text]:
     columns = room.width - LABEL_CELLS - 1 - MARGIN_CELLS
     points = points_of_page(view)
     page = ShownPage(view, points, columns, marks_on_page(view, points, columns))
-    names = mark_names(page, on_axis=room.axis == 1)
+    # names on the axis move when the page turns: on a slow link the heading has them if it can
+    in_heading = view.lean and len(set(page.marks.values())) <= room.width // HEADING_MARK_CELLS
+    names = {} if in_heading else mark_names(page, on_axis=room.axis == 1)
     unnamed = {mark for mark in page.marks.values() if mark not in names}
     lines = [_heading(view, found[0], unnamed, room.width)]
     lines += _band_lines(page, found[0], room.plot)
@@ -148,14 +154,18 @@ def _band_lines(page: ShownPage, band: Band, rows: int) -> list[Text]:
 
 
 def _has_reference(view: View) -> bool:
-    return readout_parameter(view.profile, "frequency_reference") is not None
+    """Return True if the reference has a curve; on a slow link only its number is shown."""
+    return not view.lean and readout_parameter(view.profile, "frequency_reference") is not None
 
 
 def _present(view: View, band: Band) -> tuple[float, str] | None:
-    """Return the latest value with its text; None if it is old, or while the cursor is open."""
+    """Return the latest value with its text; None if it is old, or while the cursor is open.
+
+    On a low-bandwidth link, the readout alone has it: next to the curve it would change its row.
+    """
     reading = view.reading(band.parameter.code)
     number = reading.current_number if reading is not None else None
-    if reading is None or number is None or view.page is not None:
+    if reading is None or number is None or view.page is not None or view.lean:
         return None
     if band.quantity == "output_frequency":
         number = directed(view, band.parameter, number)
