@@ -39,6 +39,36 @@ async def test_neighbors_are_read_in_one_request_with_their_units() -> None:
     assert all(r.quality is Quality.GOOD for r in readings.values())
 
 
+async def test_poll_takes_slow_values_that_lie_between_the_others() -> None:
+    """A value that was read or written since the shared reply is not one of them."""
+    profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12, 30)))
+    line = OneDrive({10: 1, 11: 2, 12: 3, 30: 4})
+    reader = Reader(DriveSession(line, 1, profile), also=frozenset({"P11", "P30"}))
+    found = await reader.read(["P10", "P12"], priority=Priority.POLL)
+    assert line.requested == [(10, 3)]
+    assert {code: item.raw for code, item in found.items()} == {"P10": 1, "P12": 3, "P11": 2}
+    later = reader.session.clock.monotonic() + 10.0
+    reader.session.image.confirm("P11", 9, later)
+    found = await reader.read(["P10", "P12"], priority=Priority.POLL)
+    assert set(found) == {"P10", "P12"}
+    assert set(await reader.read(["P10", "P12"])) == {"P10", "P12"}
+
+
+async def test_known_values_have_the_scale_of_their_time() -> None:
+    profile = profile_of(
+        parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR), parameter("INR", 9020)
+    )
+    line = OneDrive({9020: 0, 9001: 1234})
+    reader = Reader(DriveSession(line, 1, profile))
+    await reader.read(["ACC"])
+    assert reader.known(["ACC", "INR"])["ACC"].text == "12.34"
+    reader.forget()
+    assert reader.known(["ACC"])["ACC"].text == "12.34"
+    line.registers[9020] = 1
+    await reader.read(["INR"])
+    assert reader.known(["ACC"])["ACC"].text == "123.4"
+
+
 async def test_refused_word_does_not_affect_its_neighbors() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
     line = OneDrive({10: 1, 12: 3})

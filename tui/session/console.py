@@ -59,6 +59,10 @@ class DriveConsole:
         priority = Priority.POLL if again else Priority.OPERATOR_READ
         return await Reader(self.session).read(codes, priority=priority)
 
+    def known(self, codes: Iterable[str]) -> Mapping[str, Shown]:
+        """Return the last values that this program has read, however old; nothing is read."""
+        return Reader(self.session).known(codes)
+
     @property
     def device(self) -> int:
         """The drive's address."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import ClassVar
@@ -121,6 +122,7 @@ class FaultsScreen(OrderKeys):
             codes = codes_to_read(self.session.profile, view.hint)
         if view.present:
             codes += reset_codes(self.session.profile)
+        ageing = tuple(codes)  # what the drive has stored has no age: it may be of another trip
         if (place := view.stored_place) is not None and place < len(faults.stored):
             codes += faults.stored[place]
         if self._unread or self.app.replay is not None:  # the next read of it may be due now
@@ -132,10 +134,22 @@ class FaultsScreen(OrderKeys):
         except LineError as error:
             if self._unread:
                 self.app.notify(f"The history could not be read: {error}", severity="warning")
+            self._take_known(ageing)
         else:
             self._readings = {**self._readings, **found}
             self._unread = False
         self.look()
+
+    def _take_known(self, codes: Iterable[str]) -> None:
+        """Show what other screens have read, with its age, if it is newer."""
+        now = self.app.clock.monotonic()
+        known = {code: item.aged(now, 0.0) for code, item in self.console.known(codes).items()}
+        newer = {
+            code: item
+            for code, item in known.items()
+            if code not in self._readings or self._readings[code].time < item.time
+        }
+        self._readings = {**self._readings, **newer}
 
     def doctor(self) -> DoctorView:
         """Return the contents: the present fault, else an alarm, else the last trip.

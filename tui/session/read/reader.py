@@ -12,7 +12,7 @@ from tui.bus.poll_plan import PlannedRead, PolledTurn
 from tui.drive.chart import read_chart
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
-from tui.drive.read_plan import ReadPlan, ReadRequest
+from tui.drive.read_plan import Place, ReadPlan, ReadRequest
 from tui.drive.shown import depends_on, shown
 from tui.drive.values import Value, from_words, percent_of, word_count
 from tui.safety import SOURCE_AGE
@@ -34,12 +34,13 @@ class Decoding:
     """Decodes raw values with the scales and ratings known at its creation."""
 
     session: DriveSession
+    raws: Mapping[str, int] | None = None
+    """Raw values that scales and units depend on (default: those that may be trusted)."""
     _raws: Mapping[str, int] = field(init=False)
-    """Raw values that scales and units depend on."""
     _lacking: frozenset[str] = field(init=False)
 
     def __post_init__(self) -> None:
-        self._raws = self.session.image.trusted
+        self._raws = self.session.image.trusted if self.raws is None else self.raws
         self._lacking = self.session.image.lacking
 
     def decode(self, reading: Reading) -> Reading:
@@ -88,6 +89,10 @@ class Reader:
     """Name of the block or scanner that the last poll read, if it read one."""
     max_age: float = 0.0
     """Age in seconds up to which a poll uses values that another program has read."""
+    also: frozenset[str] = frozenset()
+    """Codes whose values a poll takes from replies to other reads: they may lie between them."""
+    _beside: dict[ReadRequest, tuple[Place, ...]] = field(default_factory=dict)
+    """Places of `also` in the reply to a request."""
     _polled: PolledTurn | None = None
     """Replies that the keeper has read for the current poll."""
     _met: set[str] = field(default_factory=set)
@@ -121,7 +126,7 @@ class Reader:
         priority: Priority = Priority.OPERATOR_READ,
         polled: PolledTurn | None = None,
     ) -> dict[str, Reading]:
-        """Return readings by code, in the order of `codes`.
+        """Return readings by code, in the order of `codes`; of a poll also those of `also`.
 
         A poll uses the replies that the keeper has read for it (`polled`), and reads the rest.
         """
@@ -136,7 +141,19 @@ class Reader:
         found = await self._take(frozenset(wanted), priority)
         self._note_state(wanted)
         decoding = Decoding(self.session)
-        return {code: decoding.decode(found[code]) for code in wanted}
+        return {code: decoding.decode(found[code]) for code in dict.fromkeys((*wanted, *found))}
+
+    def known(self, codes: Iterable[str]) -> dict[str, Reading]:
+        """Return the last values that this program has read, however old; nothing is read."""
+        image = self.session.image
+        held = {code: item for code in codes if (item := image.get(code)) is not None}
+        now, before = Decoding(self.session), Decoding(self.session, image.raws)
+        trusted, found = image.trusted.keys(), {}
+        for code, item in held.items():
+            # a value from before the drive may have been reset has a scale from before that, too
+            is_before = trusted.isdisjoint({code, *sources_of(item.parameter)})
+            found[code] = (before if is_before else now).decode(item)
+        return found
 
     def _note_state(self, codes: Iterable[str]) -> None:
         """Report the read state to the session, which notes when the motor was at standstill."""
@@ -171,6 +188,7 @@ class Reader:
         self.session.image.distrust()
         self.session.byte_order.forget()
         self._plans.clear()
+        self._beside.clear()
         self._met.clear()
         self._slots.forget()
 
@@ -204,7 +222,9 @@ class Reader:
         self._slots.compare_soon()
 
     async def _poll(self, codes: Iterable[str]) -> Mapping[str, Reading]:
-        return await self.read(codes, priority=Priority.POLL)
+        wanted = tuple(codes)
+        found = await self.read(wanted, priority=Priority.POLL)
+        return {code: found[code] for code in wanted}
 
     async def _read_sources(self, codes: list[str], priority: Priority) -> None:
         sources = {source for code in codes for source in sources_of(self.profile[code])}
@@ -309,13 +329,36 @@ class Reader:
             return {p.code: self._refusal(p, refusal) for p in parameters}
         unknown = self.profile.data.reading.unknown_word
         found: dict[str, Reading] = {}
-        for place in request.places:
+        places = request.places
+        if self.also and priority >= Priority.POLL and block is None:
+            places += self._newer_beside(request, reply.time)
+        for place in places:
             parameter = self.profile[place.code]
             words = reply.words[place.offset : place.offset + word_count(parameter)]
             alone = request.count == word_count(parameter) and block is None
             if alone or parameter.is_bits or unknown not in words:
                 found[place.code] = self._reading(parameter, words, reply.time, priority)
         return found
+
+    def _newer_beside(self, request: ReadRequest, reported: float) -> tuple[Place, ...]:
+        """Return the places of `also` in a reply that is newer than what is known of them."""
+        if request not in self._beside:
+            span = range(request.address, request.address + request.count)
+            sure, _ = self._by_trust(self.also.difference(place.code for place in request.places))
+            own = (self.profile[code] for code in sorted(sure))
+            self._beside[request] = tuple(
+                Place(parameter.code, parameter.address - request.address)
+                for parameter in own
+                if parameter.function == request.function
+                and parameter.address in span
+                and parameter.address + word_count(parameter) - 1 in span
+            )
+        image, time = self.session.image, self.session.clock.line_time(reported)
+        return tuple(
+            place
+            for place in self._beside[request]
+            if place.code not in image.refused and image.changed(place.code) < time
+        )
 
     def _longest(self, request: ReadRequest, priority: Priority, since: float) -> float:
         """Return the greatest age in seconds of a shared reply that may replace this read."""
