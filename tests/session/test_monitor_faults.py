@@ -153,6 +153,16 @@ async def test_failed_cycle_shows_its_error_and_no_new_values(bench: Bench) -> N
     assert after.readings["SPEED"].raw == 777
 
 
+async def test_monitor_that_begins_on_a_silent_drive_shows_what_is_known(bench: Bench) -> None:
+    (before, _), *_ = await bench.run(1)
+    await bench.end()
+    bench.line.task = None
+    ((failed, _),) = await bench.fail(silence(), cycles=1)
+    assert failed.error
+    assert failed.readings["SPEED"].raw == 500
+    assert failed.readings["SPEED"].time == before.readings["SPEED"].time
+
+
 @pytest.mark.parametrize("fault", [LineLost("gone"), None], ids=["line lost", "many failures"])
 async def test_value_possibly_of_another_drive_is_read_again(
     bench: Bench, fault: Exception | None

@@ -35,11 +35,17 @@ from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.trend import Trend
 from tui.session.record.history import read_history
 from tui.session.record.record_file import RecordFile
-from tui.session.record.repeated_cycles import cycles_of
+from tui.session.record.repeated_cycles import RepeatedCycles, cycles_of
 from tui.session.record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from tui.session.record.replay_text import open_replay, parse_replay, time_in
 from tui.session.record.schema import GOOD, SILENT, EventRow, ReplyRow
-from tui.session.replay import UnwrittenJournal, open_past, pass_lead, take_drives
+from tui.session.replay import (
+    UnwrittenJournal,
+    open_past,
+    pass_lead,
+    recall_trip,
+    take_drives,
+)
 from tui.session.replay_past import RecordedCycles, recall_past
 from tui.session.shown import Quality
 from tui.simulator import DriveSpec
@@ -376,7 +382,7 @@ def replayed_drive(
     with closing(line):
         fleet = Fleet(line, UnwrittenJournal(), None, None, line.clock)
         take_drives(line, fleet)
-        asyncio.run(pass_lead(line, fleet, device, lambda console: None, 1.0))
+        asyncio.run(pass_lead(line, fleet, device, lambda console, period: None, 1.0))
         yield line, fleet.consoles[0]
         fleet.forget()
 
@@ -401,10 +407,8 @@ def test_curve_of_the_open_drive_has_each_recorded_cycle(tmp_path: Path) -> None
     assert [at for at, value in found.items() if value == 20.0] == [PEAK]
 
 
-@pytest.mark.parametrize("device", [1, None])
-def test_trip_before_a_seek_has_its_fault_after_the_reset(
-    device: int | None, tmp_path: Path
-) -> None:
+def trip(folder: Path) -> Path:
+    """A record with cycles of drive 1 in each second; it is in fault from 200 to 230 s."""
     lft = load("atv71")["LFT"].address
     rows = [
         row(at + place, words, address=address)
@@ -415,10 +419,96 @@ def test_trip_before_a_seek_has_its_fault_after_the_reset(
         )
     ]
     profile = event(0.5, "profile", json.dumps({"profile": "atv71"}), 1)
-    path = record(tmp_path, *rows, events=(profile, event(200.1, "fault", "Tripped.", 1)))
-    with replayed_drive(path, 400, device) as (_, console):
+    return record(folder, *rows, events=(profile, event(200.1, "fault", "Tripped.", 1)))
+
+
+@pytest.mark.parametrize("device", [1, None])
+def test_trip_before_a_seek_has_its_fault_after_the_reset(
+    device: int | None, tmp_path: Path
+) -> None:
+    with replayed_drive(trip(tmp_path), 400, device) as (_, console):
         found = [point.codes for point in console.monitor.trend if point.mark == "trip"]
     assert found == [("ObF Overbraking",)]
+
+
+@pytest.mark.parametrize(("at", "known"), [(400, True), (215, True), (199, False)])
+def test_last_trip_before_a_seek_has_the_seconds_before_it(
+    at: float, known: bool, tmp_path: Path
+) -> None:
+    """Also if it was reset since, or the drive is in fault at the begin of the replay."""
+
+    def start(console: DriveConsole, period: float) -> None:
+        console.monitor.start(period=period)
+
+    with replayed_drive(trip(tmp_path), at, 1) as (line, console):
+        asyncio.run(recall_trip(line, console, start, 1.0))
+        found = console.recorder.latest
+    assert (found is not None) == known
+    if found is not None:
+        assert found.wall - BEGIN == pytest.approx(200, abs=0.1)
+        assert found.fault is not None
+        assert found.fault.code == "ObF"
+        assert [round(moment.time - BEGIN) for moment in found.moments] == [*range(170, 201)]
+        assert found.moments[-2].texts[0] == "30.0"
+
+
+def test_curve_has_a_gap_while_the_line_was_lost(tmp_path: Path) -> None:
+    """Nothing was sent then. Another read between two checks is not a point."""
+    rows = [row(at, (0x0637, 300, 300, 84), address=3201) for at in (*range(1, 40), 60, 61)]
+    rows.append(row(30.5, (300,), address=3202))
+    states = event(42, "line", "lost The adapter."), event(59, "line", "connected")
+    text = json.dumps({"profile": "atv71"})
+    path = record(tmp_path, *rows, events=(event(0.5, "profile", text, 1), *states))
+    with replayed_drive(path, 61, None) as (line, console):
+        open_past(line, console, lambda console, period: None, 1.0)
+        end = time.monotonic() + 5
+        while 10 not in currents(console) and time.monotonic() < end:
+            time.sleep(0.01)
+        found = currents(console)
+        marks = [round(p.time - BEGIN) for p in console.monitor.trend if p.mark == "lost"]
+    assert marks == [42]
+    assert 30.5 not in found
+    assert [at for at, value in found.items() if value is None] == [42]
+
+
+async def test_monitor_of_a_replay_fails_when_the_line_is_lost(tmp_path: Path) -> None:
+    """It does not wait for the cycle after the loss."""
+    rows = [row(at, (10,)) for at in (1, 2, 3, 6)]
+    states = event(4, "line", "lost The adapter."), event(5, "line", "connected")
+    with replayed(record(tmp_path, *rows, events=states), 3) as line:
+        found, ended = RepeatedCycles(line, 1), []
+
+        async def work() -> None:
+            turn = await found.next([PlannedRead(100, 1)], BEGIN + 3.5, 0.5)
+            ended.append(turn.ended - BEGIN)
+
+        line.spawn(work, "cycle")
+        await line.run_to(BEGIN + 4.5)
+        assert ended == [pytest.approx(4, abs=1e-3)]
+
+
+def test_first_cycle_of_a_replay_is_the_last_recorded_one(tmp_path: Path) -> None:
+    """A word that failed in an earlier cycle does not make it fail."""
+    rows = [
+        row(1, (5,), address=900),
+        row(2, registers=1, quality=SILENT, address=900),
+        row(4, (12,)),
+        row(5, registers=1, quality=SILENT),
+    ]
+    reads = [PlannedRead(100, 1), PlannedRead(900, 1)]
+    with replayed(record(tmp_path, *rows), 4.5) as line:
+        turn = RepeatedCycles(line, 1).last(reads)
+        assert turn is not None
+        replies = [turn.take(read, 0.0) for read in reads]
+        assert [reply and reply.words for reply in replies] == [(12,), (5,)]
+        assert turn.ended == line.clock.monotonic()
+        line.clock.skip_to(BEGIN + 5)
+        failed = RepeatedCycles(line, 1).last(reads)
+        assert failed is not None
+        with pytest.raises(NoAnswer):
+            failed.take(reads[1], 0.0)
+        line.clock.skip_to(BEGIN + 20)
+        assert RepeatedCycles(line, 1).last(reads) is None
 
 
 @pytest.mark.parametrize("at", [40.3, 40.8])
@@ -450,7 +540,7 @@ def test_cycles_without_a_reply_are_cycles_too(tmp_path: Path) -> None:
 def test_curve_of_a_drive_opened_later_has_each_recorded_cycle(tmp_path: Path) -> None:
     with replayed_drive(cycles(tmp_path, range(1, 450)), 400, None) as (line, console):
         assert PEAK - 1 not in currents(console)
-        open_past(line, console)
+        open_past(line, console, lambda console, period: None, 1.0)
         end = time.monotonic() + 5
         while PEAK - 1 not in currents(console) and time.monotonic() < end:
             time.sleep(0.01)
@@ -523,7 +613,9 @@ async def test_values_that_came_by_a_block_are_shown_as_live(tmp_path: Path) -> 
     with closing(line):
         fleet = Fleet(line, UnwrittenJournal(), None, None, line.clock)
         take_drives(line, fleet)
-        await pass_lead(line, fleet, 1, lambda console: console.monitor.start(period=0.5), 0.5)
+        await pass_lead(
+            line, fleet, 1, lambda console, period: console.monitor.start(period=period), 0.5
+        )
         found = fleet.consoles[0].latest
         fleet.forget()
     assert found is not None

@@ -19,7 +19,6 @@ from .open_lines import LineEvents, PanelLine
 if TYPE_CHECKING:
     from tui.bus.line_events import LineEvent
     from tui.session.connect.open_line import OpenLine
-    from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
@@ -112,9 +111,15 @@ class LineOwner(Panel):
         The drive `device` was monitored before that time; if it `goes_on`, it still is.
         """
         from tui.session.fleet import Fleet
-        from tui.session.replay import UnwrittenJournal, add_trips, pass_lead, take_drives
+        from tui.session.replay import (
+            UnwrittenJournal,
+            add_trips,
+            pass_lead,
+            recall_trip,
+            take_drives,
+        )
 
-        from .monitor.assembly import codes_beside
+        from .monitor.assembly import start_monitor
 
         replay = opened.replay
         assert replay is not None
@@ -123,14 +128,15 @@ class LineOwner(Panel):
         for text in await asyncio.to_thread(take_drives, replay, fleet):
             self.events.add("alarm", text)
 
-        def monitor(console: DriveConsole) -> None:
-            beside = codes_beside(console.session.profile)
-            console.monitor.start(period=self.period, extra=beside)
+        await pass_lead(replay, fleet, device, start_monitor, self.period, goes_on=goes_on)
 
-        await pass_lead(replay, fleet, device, monitor, self.period, goes_on=goes_on)
-        self.run_worker(
-            asyncio.to_thread(add_trips, replay, device), group="trips", exit_on_error=False
-        )
+        async def seek_trips() -> None:
+            await asyncio.to_thread(add_trips, replay, device)
+            if device is not None and (console := fleet.console(device)) is not None:
+                await recall_trip(replay, console, start_monitor, self.period)
+
+        group = f"trips of {replay.path}"
+        self.run_worker(seek_trips(), group=group, exclusive=True, exit_on_error=False)
         return PanelLine(opened, fleet)
 
     def open_line_of(self, text: str) -> PanelLine | None:

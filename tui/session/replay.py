@@ -26,7 +26,7 @@ from .fleet import Fleet
 from .journal import Entry, Journal
 from .monitor.fault_record import SECONDS_KEPT
 from .monitor.line_watch import GLANCE
-from .monitor.monitor import codes_of_state
+from .monitor.rates import codes_of_state
 from .monitor.trend import Trend
 from .read.reader import Reader
 from .reading import Origin, Reading
@@ -34,7 +34,7 @@ from .record.newest import ends_of_cycles
 from .record.repeated_cycles import RepeatedCycles, cycles_of
 from .record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
 from .record.runs import history_of, read_events
-from .record.schema import EventRow, to_microseconds
+from .record.schema import EventRow
 from .replay_past import (
     PAST_SECONDS,
     RECENT_SECONDS,
@@ -59,11 +59,17 @@ SOUGHT_WITHIN = 5
 """Periods in which it is sought."""
 LONGER_THAN_LEAD = 1000.0
 """Seconds between the checks of drives before a replay begins: samples replace them."""
-SAME_TRIP_WITHIN = 5_000_000
-"""Microseconds between a trip and the event by which a program reported it."""
+SAME_TRIP_WITHIN = 5.0
+"""Seconds between a trip and the event by which a program reported it."""
+CODE_WITHIN = 3.0
+"""Seconds after a trip in which its code is read."""
+TRIPS_SOUGHT = 3
+"""Reported faults of which one is the last trip: a drive may be in fault at first."""
 EVER = 4e9
 """A time after all records, in seconds since 1970."""
 UNNAMED = "Drive {device}: the record does not name its profile. Its values are not shown."
+BeginPolls = Callable[[DriveConsole, float], None]
+"""Starts the monitor of a drive, with its period in seconds."""
 
 
 class UnwrittenJournal(Journal):
@@ -115,14 +121,25 @@ def take_drives(line: ReplayLine, fleet: Fleet) -> list[str]:
             fleet.note(identity)
             reported.append(NO_PROFILE.format(device=device, error=error))
             continue
-        line.use_profile(device, means_of(profile).get, partial(_place_of, profile))
-        session = DriveSession(line, device, profile, identity, line.clock)
-        session.arming.barred = REPLAY_SENDS_NOTHING
-        session.reads_blocks = False
-        fleet.take(session).monitor.steady.recorded = RepeatedCycles(line, device)
+        _read_from(line, fleet.take(_session(line, device, profile, identity)))
         if named.hash and named.hash != digest_of(profile):
             reported.append(OTHER_PROFILE.format(device=device, profile=id))
     return reported
+
+
+def _session(
+    line: ReplayLine, device: int, profile: Profile, identity: DriveIdentity | None
+) -> DriveSession:
+    """Return a drive of the replay."""
+    line.use_profile(device, means_of(profile).get, partial(_place_of, profile))
+    session = DriveSession(line, device, profile, identity, line.clock)
+    session.arming.barred = REPLAY_SENDS_NOTHING
+    session.reads_blocks = False
+    return session
+
+
+def _read_from(line: ReplayLine, console: DriveConsole) -> None:
+    console.monitor.steady.recorded = RepeatedCycles(line, console.device)
 
 
 def _place_of(profile: Profile, code: str) -> tuple[int, int] | None:
@@ -155,7 +172,9 @@ def add_trips(line: ReplayLine, device: int | None) -> None:
             event.utc for event in line.events if (event.device, event.kind) == (each, "fault")
         ]
         new = [
-            trip for trip in trips if all(abs(trip.utc - utc) > SAME_TRIP_WITHIN for utc in known)
+            trip
+            for trip in trips
+            if all(abs(trip.utc - utc) > SAME_TRIP_WITHIN * 1e6 for utc in known)
         ]
         line.events = tuple(sorted((*line.events, *new), key=attrgetter("utc")))
 
@@ -186,12 +205,6 @@ def _take_known(line: ReplayLine, session: DriveSession) -> None:
     session.take(found)
 
 
-def _trips_in_lead(line: ReplayLine, device: int | None) -> bool:
-    """Return True if a drive trips shortly before the replay: Faults shows its values then."""
-    span = range(to_microseconds(line.clock.monotonic()), to_microseconds(line.at) + 1)
-    return any(e.kind == "fault" and e.device == device and e.utc in span for e in line.events)
-
-
 def in_step(line: ReplayLine, device: int | None, since: float, period: float) -> float:
     """Return when the first recorded cycle of a device from `since` on ended; `since` without one.
 
@@ -215,7 +228,7 @@ async def pass_lead(
     line: ReplayLine,
     fleet: Fleet,
     device: int | None,
-    monitor: Callable[[DriveConsole], None],
+    monitor: BeginPolls,
     period: float,
     *,
     goes_on: bool = True,
@@ -227,10 +240,7 @@ async def pass_lead(
     """
     clock, drives, watch = line.clock, fleet.consoles, fleet.line_watch
     shown = fleet.console(device) if device is not None else None
-    begin = clock.monotonic()
-    if not _trips_in_lead(line, device):
-        begin = max(begin, line.at - SECONDS_KEPT)
-    begin = in_step(line, device, begin, period)
+    begin = in_step(line, device, max(clock.monotonic(), line.at - SECONDS_KEPT), period)
     for console in drives:
         since, monitored = line.at - RECENT_SECONDS, line.at
         if console is shown:
@@ -244,7 +254,7 @@ async def pass_lead(
         console.recorder.since = await asyncio.to_thread(_first_read, line, console.session)
     if shown is not None:
         await line.run_to(begin, EXACT_TAKES)
-        monitor(shown)
+        monitor(shown, period)
         watch.keep(shown.session, shown.monitor)
     await line.run_to(line.at, EXACT_TAKES)
     watch.least_period = GLANCE
@@ -255,18 +265,65 @@ async def pass_lead(
         watch.keep(console.session, console.monitor)  # checks it at this time
 
 
+async def recall_trip(
+    line: ReplayLine,
+    console: DriveConsole,
+    monitor: BeginPolls,
+    period: float,
+) -> None:
+    """Have a drive know the record of its last trip up to now, as a monitor then made it.
+
+    The seconds around that trip are replayed on a line of their own.
+    """
+    now = line.clock.monotonic()
+    for trip in _last_trips(line, console.device, now):
+        until = min(trip + CODE_WITHIN, now)
+        lead = until - trip + SAME_TRIP_WITHIN + SECONDS_KEPT
+        past = ReplayLine(line.path, until, lead=lead, files=line.files)
+        past.open()
+        try:
+            session = console.session
+            then = DriveConsole(
+                _session(past, console.device, session.profile, session.identity),
+                UnwrittenJournal(),
+            )
+            _read_from(past, then)
+            await past.run_to(in_step(past, console.device, past.clock.monotonic(), period))
+            monitor(then, period)
+            await past.run_to(until)
+            if (record := then.recorder.latest) is not None:
+                console.recorder.recall(record)
+                return
+        finally:
+            await asyncio.to_thread(past.close)
+
+
+def _last_trips(line: ReplayLine, device: int, now: float) -> list[float]:
+    """Return the last reported faults of a drive up to a time, the newest first."""
+    found: list[float] = []
+    for event in reversed(line.events):
+        at = event.utc / 1e6
+        if event.kind == "fault" and event.device == device and at <= now:
+            # the code of a fault may be reported on its own
+            if found and found[-1] - at < SAME_TRIP_WITHIN:
+                found.pop()
+            found.append(at)
+    return found[:TRIPS_SOUGHT]
+
+
 async def _resume(console: DriveConsole, curve: Trend) -> None:
     """Continue a curve; in the line's loop, where nothing else adds to it."""
     console.monitor.recall(curve)
 
 
-def open_past(line: ReplayLine, console: DriveConsole) -> None:
-    """Give the curve of a drive that is opened each recorded cycle; it takes a moment."""
+def open_past(line: ReplayLine, console: DriveConsole, monitor: BeginPolls, period: float) -> None:
+    """Give a drive that is opened each recorded cycle and its last trip; it takes a moment."""
     until = line.clock.monotonic()
 
     async def work() -> None:
         past = RecordedCycles(line, console)
         await _resume(console, await asyncio.to_thread(recorded_curve, past, until))
+        await recall_trip(line, console, monitor, period)
 
     with suppress(LineError):
         line.spawn(work, f"curve of {console.device}")

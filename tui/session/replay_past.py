@@ -17,9 +17,9 @@ from .console import DriveConsole
 from .drive_state import DriveState, drive_state
 from .monitor.line_watch import LineWatch
 from .monitor.look import Look, last_that_brought
-from .monitor.monitor import codes_of_state
+from .monitor.rates import codes_of_state
 from .monitor.trend import Trend, trend_codes
-from .read.reader import Decoding
+from .read.decoded import Decoding
 from .reading import Origin, Reading
 from .record.newest import PAUSE_OF_CYCLES, ends_of_cycles
 from .record.replay_line import ReplayLine
@@ -145,9 +145,14 @@ class RecordedCycles:
                 return
             self._take(reply)
             pause = math.inf if following is None else (following.sent - reply.ended) / 1e6
-            is_end = pause > PAUSE_OF_CYCLES or (following is not None and self._has(following))
-            if is_end and self._is_of_curve():
-                yield self._look_at(reply.ended / 1e6)
+            if pause > PAUSE_OF_CYCLES or (following is not None and self._has(following)):
+                if self._is_of_curve():
+                    yield self._look_at(reply.ended / 1e6)
+                else:
+                    self._read_new()
+            end = until if following is None else following.sent / 1e6
+            if pause > PAUSE_OF_CYCLES and (lost := self.line.lost_within(reply.ended / 1e6, end)):
+                yield self._failed(lost.reason, lost.since)
 
     def checks(self, until: float) -> Iterable[Look]:
         """Return the cycles that follow the curve of the drive, up to a time."""
@@ -184,8 +189,11 @@ class RecordedCycles:
             self._read_new()
             self._covered.clear()
             self._in_block = in_block
+        shape = reply.function, reply.address, reply.registers
+        if reply.quality == REFUSED:
+            for place in self._of(shape):
+                self._readings.pop(place.parameter.code, None)
         if reply.quality == GOOD:
-            shape = reply.function, reply.address, reply.registers
             self._new.pop(shape, None)
             self._new[shape] = reply
 
@@ -198,8 +206,15 @@ class RecordedCycles:
         return not new.isdisjoint(following & self._curves)
 
     def _is_of_curve(self) -> bool:
-        failed = self._newest is not None and self._newest.quality > REFUSED
-        return failed or any(place.in_curve for shape in self._new for place in self._of(shape))
+        """True if the newest read failed, or all values of the curve were read since the last look.
+
+        Other reads may bring some of them.
+        """
+        assert self._newest is not None
+        if self._newest.quality > REFUSED:
+            return True
+        new = {place.parameter.code for shape in self._new for place in self._of(shape)}
+        return not new.isdisjoint(self._curves) and new >= self._readings.keys() & self._curves
 
     def _of(self, shape: tuple[int, int, int]) -> list[_Place]:
         if shape not in self._covered:
@@ -224,12 +239,14 @@ class RecordedCycles:
         self._read_new()
         assert self._newest is not None
         if self._newest.quality > REFUSED:
-            error = str(self._newest.error(self.console.device))
-            self._look = Look(None, error, at, None, {}, last_that_brought(self._look))
-        else:
-            oldest = at - VALUES_WITHIN
-            found = {code: item for code, item in self._readings.items() if item.time >= oldest}
-            self._look = Look(self._state_of(found), "", at, None, found)
+            return self._failed(str(self._newest.error(self.console.device)), at)
+        oldest = at - VALUES_WITHIN
+        found = {code: item for code, item in self._readings.items() if item.time >= oldest}
+        self._look = Look(self._state_of(found), "", at, None, found)
+        return self._look
+
+    def _failed(self, error: str, at: float) -> Look:
+        self._look = Look(None, error, at, None, {}, last_that_brought(self._look))
         return self._look
 
     def _read_new(self) -> None:

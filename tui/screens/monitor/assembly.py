@@ -1,9 +1,13 @@
-"""Rows of all parts of Monitor, and of its other values in columns; pure functions of a view."""
+"""Rows of all parts of Monitor, and of its other values in columns; pure functions of a view.
+
+`start_monitor` starts the polls of what they show.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
@@ -32,6 +36,9 @@ from .words import (
     word_line,
     word_pages,
 )
+
+if TYPE_CHECKING:
+    from tui.session.console import DriveConsole
 
 LABELS: dict[Quantity, str] = {
     "ramp_output": "After ramp",
@@ -333,3 +340,8 @@ def codes_beside(profile: Profile) -> list[str]:
             codes.append(parameter.code)
     codes += [parameter.code for parameter in watched_words(profile)]
     return list(dict.fromkeys(codes))
+
+
+def start_monitor(console: DriveConsole, period: float) -> None:
+    """Poll what Monitor shows, each `period` seconds."""
+    console.monitor.start(period=period, extra=codes_beside(console.session.profile))

@@ -27,10 +27,10 @@ from ..keys.table import bindings, keys_line
 from ..state_words import stands_by
 from .arrange import READOUT_ROWS, WIDE, Arrangement, arrange
 from .assembly import (
-    codes_beside,
     curve_or_table,
     monitor_parts,
     other_values,
+    start_monitor,
     tables,
     watched_words,
 )
@@ -109,12 +109,11 @@ class MonitorScreen(CursorKeys):
     def on_mount(self) -> None:
         """Start polling the drive."""
         if self.app.replay is None or not self.console.monitor.started:
-            beside = codes_beside(self.session.profile)
-            self.console.monitor.start(period=self.app.period, extra=beside)
+            start_monitor(self.console, self.app.period)
             if self.app.replay is not None:
                 from tui.session.replay import open_past
 
-                open_past(self.app.replay, self.console)
+                open_past(self.app.replay, self.console, start_monitor, self.app.period)
 
     def look_in_time(self) -> None:
         """Refresh the screen; on a low-bandwidth link figures wait for the refresh of the frame.

@@ -28,6 +28,9 @@ SECONDS_KEPT = 30.0
 TRIP_NEAR = 2.0
 """Seconds between a value and the last cycle before a trip for it to count as that of the trip."""
 
+SAME_RECORD = 5.0
+"""Seconds between two records of the same trip."""
+
 
 @dataclass(frozen=True, slots=True)
 class Moment:
@@ -129,6 +132,11 @@ class Recorder:
             now.time, now.wall, now.state.fault, codes, headings, moments, writes, before,
             points, now.period,
         )  # fmt: skip
+
+    def recall(self, record: FaultRecord) -> None:
+        """Take the record of an earlier trip, unless there was another one since."""
+        if self.latest is None or self.latest.time < record.time + SAME_RECORD:
+            self.latest = record
 
     def acknowledge(self) -> None:
         """Note that a person has viewed the record."""

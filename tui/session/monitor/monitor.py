@@ -14,10 +14,8 @@ from dataclasses import replace
 
 from tui.bus.api import Contact, LineWorker, Priority, contact_of
 from tui.bus.errors import LineClosed, LineError, LineLost
-from tui.drive.chart import watched_codes
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
-from tui.drive.profile.profile import Profile
 from tui.safety import SHARED_AGE
 
 from ..drive import DriveSession
@@ -27,16 +25,14 @@ from ..read.rotation import Rotation
 from ..reading import Reading
 from ..shown import Quality
 from .block_notes import BlockNotes
-from .rates import SLOW_FACTOR, Rates, bad_readings, rates_of
+from .rates import SLOW_FACTOR, Rates, bad_readings, codes_of_state, rates_of
 from .snapshot import Snapshot, stale_after
 from .steady_cycles import SteadyCycles, SteadyPlan
 from .trend import (
-    TREND_QUANTITIES,
     Trend,
     TrendCycle,
     TrendNotes,
     TrendPoint,
-    readout_parameter,
 )
 
 log = logging.getLogger(__name__)
@@ -248,8 +244,10 @@ class Monitor:
         begun: deque[float] = deque(maxlen=RATE_OVER)
         due = Rotation(SLOW_FACTOR)
         self._all_due = True
+        self.reader.also = frozenset(rates.seldom)
         cycle = failures = 0
         try:
+            self.steady.begin_recorded((*rates.fast, *rates.seldom))
             while True:
                 started = self.steady.begun
                 cycle += 1
@@ -273,6 +271,8 @@ class Monitor:
                     if contact == "swapped":
                         now = self.session.clock.monotonic()
                         readings = bad_readings(self.profile, rates, now, error)
+                    else:  # it may have failed since before this monitor began
+                        readings = {**self.reader.known((*rates.fast, *rates.seldom)), **readings}
                     begun.clear()
                     due.failed(self.reader.groups)
                     if self._may_be_another(fault, failures):
@@ -383,14 +383,6 @@ class Monitor:
         self._latest = snapshot
         self.add_to_trend(snapshot)
         self._hand_out(snapshot)
-
-
-def codes_of_state(profile: Profile) -> tuple[str, ...]:
-    """Return the codes of the drive's state, its fault, and the values of its trend."""
-    found = (readout_parameter(profile, quantity) for quantity in TREND_QUANTITIES)
-    codes = [*watched_codes(profile), profile.data.faults.parameter]
-    codes += [parameter.code for parameter in found if parameter is not None]
-    return tuple(dict.fromkeys(code for code in codes if code))
 
 
 def _span(begun: Sequence[float], period: float) -> float:

@@ -9,6 +9,7 @@ from tui.drive.chart import fault_code, watched_codes
 from tui.drive.profile.profile import Profile
 
 from ..reading import Reading
+from .trend import TREND_QUANTITIES, readout_parameter
 
 SLOW_FACTOR = 10
 """Number of cycles in which each slow value is read once."""
@@ -75,3 +76,11 @@ def monitoring_codes(profile: Profile) -> list[str]:
     if profile.data.faults.parameter:
         codes.append(profile.data.faults.parameter)
     return list(dict.fromkeys(codes))
+
+
+def codes_of_state(profile: Profile) -> tuple[str, ...]:
+    """Return the codes of the drive's state, its fault, and the values of its trend."""
+    found = (readout_parameter(profile, quantity) for quantity in TREND_QUANTITIES)
+    codes = [*watched_codes(profile), profile.data.faults.parameter]
+    codes += [parameter.code for parameter in found if parameter is not None]
+    return tuple(dict.fromkeys(code for code in codes if code))

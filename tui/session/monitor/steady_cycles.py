@@ -18,7 +18,8 @@ from tui.bus.poll_plan import (
 )
 
 from ..drive import DriveSession
-from ..read.reader import Reader, sources_of
+from ..read.decoded import sources_of
+from ..read.reader import Reader
 from ..read.rotation import Rotation
 from ..reading import Reading
 
@@ -47,6 +48,9 @@ class CycleSource(Protocol):
 
     async def next(self, reads: Sequence[PlannedRead], at: float, period: float) -> PolledTurn:
         """Wait for the end of the next cycle of these reads; it is due `at` a time."""
+
+    def last(self, reads: Sequence[PlannedRead]) -> PolledTurn | None:
+        """Return the cycle of these reads that ended last; None if that is too long ago."""
 
 
 class SteadyCycles:
@@ -100,11 +104,19 @@ class SteadyCycles:
         """Wait for the next cycle of a record; return False on a live line."""
         if self.recorded is None:
             return False
+        self.received = await self.recorded.next(self._reads_of(codes), at, period)
+        return True
+
+    def begin_recorded(self, codes: Iterable[str]) -> None:
+        """Begin with the last cycle of a record, if this is a replay."""
+        if self.recorded is not None:
+            self.received = self.recorded.last(self._reads_of(codes))
+
+    def _reads_of(self, codes: Iterable[str]) -> tuple[PlannedRead, ...]:
+        """Return the reads of these codes, with those that set their scales."""
         profile, known = self._reader.profile, tuple(codes)
         sources = (source for code in known for source in sources_of(profile[code]))
-        reads = self._reader.planned((*known, *sources))
-        self.received = await self.recorded.next(reads, at, period)
-        return True
+        return self._reader.planned((*known, *sources))
 
     async def next(self, plan: SteadyPlan, due: Rotation, at: float) -> bool:
         """Wait for the keeper's next cycle; return False if this program must read it."""

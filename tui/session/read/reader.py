@@ -13,67 +13,19 @@ from tui.drive.chart import read_chart
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.read_plan import Place, ReadPlan, ReadRequest
-from tui.drive.shown import depends_on, shown
-from tui.drive.values import Value, from_words, percent_of, word_count
+from tui.drive.values import from_words, word_count
 from tui.safety import SOURCE_AGE
 
 from ..drive import DriveSession
 from ..image import NEVER_READ
 from ..reading import Origin, Reading
-from ..shown import Rating
+from .decoded import Decoding, sources_of
 from .kept_plans import KeptPlans, planned_read, planned_reads
 from .presence import look_for_drive, meets_silence
 from .slots import Slots
 
 ASK_AGAIN = 30.0
 """Seconds after which a poll reads a refused parameter again."""
-
-
-@dataclass(slots=True)
-class Decoding:
-    """Decodes raw values with the scales and ratings known at its creation."""
-
-    session: DriveSession
-    raws: Mapping[str, int] | None = None
-    """Raw values that scales and units depend on (default: those that may be trusted)."""
-    _raws: Mapping[str, int] = field(init=False)
-    _lacking: frozenset[str] = field(init=False)
-
-    def __post_init__(self) -> None:
-        self._raws = self.session.image.trusted if self.raws is None else self.raws
-        self._lacking = self.session.image.lacking
-
-    def decode(self, reading: Reading) -> Reading:
-        """Return the reading with its value and unit; unchanged if it has no raw value."""
-        if reading.raw is None:
-            return reading
-        value = self._value(reading.parameter, reading.raw)
-        return reading.decoded(value, self._physical(reading.parameter, value))
-
-    def _value(self, parameter: Parameter, raw: int) -> Value:
-        return shown(self.session.profile, parameter, raw, self._raws, self._lacking)
-
-    def _physical(self, parameter: Parameter, value: Value) -> Value | None:
-        """Convert a percentage to the unit of its rating.
-
-        A rating that a person entered takes precedence over the drive's own.
-        """
-        if parameter.unit != "%" or value.number is None:
-            return None
-        rating = self.session.ratings.get(parameter.code)
-        own_raw = self._raws.get(parameter.rating)
-        if rating is None and own_raw is not None:
-            own = self._value(self.session.profile[parameter.rating], own_raw)
-            rating = Rating(own.number, own.unit) if own.number is not None else None
-        if rating is None:
-            return None
-        number = percent_of(value.number, rating.number)
-        return Value(value.raw, number, rating.unit, f"{number:f}")
-
-
-def sources_of(parameter: Parameter) -> list[str]:
-    """Return the codes of the parameters that set this one's scale, unit or rating."""
-    return [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]
 
 
 @dataclass(slots=True)

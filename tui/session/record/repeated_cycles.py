@@ -124,10 +124,24 @@ class RepeatedCycles:
         due, cycle = max(at, now), self._following(now, reads)
         works = self._line.state_at(due).status is LineStatus.CONNECTED
         if works and cycle is not None and cycle.begun / 1e6 < due + max(period, SOON):
-            await clock.sleep(cycle.last.ended / 1e6 - now)
-            return RepeatedTurn(self._line, self._device, cycle)
+            lost = self._line.lost_within(due, cycle.begun / 1e6)
+            if lost is None:
+                await clock.sleep(cycle.last.ended / 1e6 - now)
+                return RepeatedTurn(self._line, self._device, cycle)
+            due = lost.since
         await clock.sleep(due - now)
         return PolledTurn(0, clock.monotonic(), {})
+
+    def last(self, reads: Sequence[PlannedRead]) -> PolledTurn | None:
+        """Return the cycle that ended last, as one of this time; None if that is too long ago."""
+        now = self._line.clock.monotonic()
+        found, _ = cycles_of(self._line, self._device, now - SOON, reads)
+        ended = [cycle for cycle in found if cycle.last.ended <= to_microseconds(now)]
+        if not ended or self._line.state_at(now).status is not LineStatus.CONNECTED:
+            return None
+        turn = RepeatedTurn(self._line, self._device, ended[-1])
+        turn.begun = turn.ended = now
+        return turn
 
     def _following(self, now: float, reads: Sequence[PlannedRead]) -> RepeatedCycle | None:
         """Return the first cycle that ends after a time; None without one."""

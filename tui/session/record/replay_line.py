@@ -44,7 +44,7 @@ from tui.bus.trace import Frame
 from tui.wire.frames import frame
 
 from .rebuilt_frames import RebuiltFrame, frames_of
-from .replay_clock import ReplayClock
+from .replay_clock import WAKING_TURNS, ReplayClock
 from .replayed_record import ReplayedRecord
 from .schema import RecordDamaged, to_microseconds
 
@@ -320,6 +320,8 @@ class ReplayLine(ReplayedRecord):
         """
 
         async def run() -> None:
+            for _ in range(WAKING_TURNS):  # work that was just started begins to sleep
+                await asyncio.sleep(0)
             end = min(at, self.clock.end)
             if not await self.clock.run_to(end, takes):
                 self.clock.skip_to(end)
@@ -331,6 +333,8 @@ class ReplayLine(ReplayedRecord):
         done: Future[None] = Future()
 
         async def run() -> None:
+            if not done.set_running_or_notify_cancel():
+                return
             try:
                 await work()
                 done.set_result(None)

@@ -77,6 +77,12 @@ class ReplayedRecord:
                 return LineState(found, reason, last.utc / 1e6)
         return LineState(LineStatus.CONNECTED, "", last.utc / 1e6)
 
+    def lost_within(self, since: float, until: float) -> LineState | None:
+        """Return how the line was first lost in a time; None if it was not."""
+        span = range(to_microseconds(since), to_microseconds(until) + 1)
+        states = (self.state_at(event.utc / 1e6) for event in self._states if event.utc in span)
+        return next((state for state in states if state.status is LineStatus.LOST), None)
+
     def in_block(self, device: int, utc: int) -> Mapping[int, str]:
         """Return the codes by register of a device's block at a time in microseconds."""
         return self._blocks[device].at(utc)
