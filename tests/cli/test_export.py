@@ -242,6 +242,11 @@ RESULTS = ["1    5.9\n2    9.9\n", "), 9.9)]\n", "9.9\n", "31|2024-10-04 22:00:0
 """Output of the examples, in their order."""
 
 
+def test_frames_of_one_drive_are_exported_alone(line: str, tmp_path: Path) -> None:
+    path = tmp_path / "frames.pcapng"
+    assert run(0, "export", line, "-d", "2", "--out", path) == f"Wrote 20 frames to {path}.\n"
+
+
 def test_page_has_an_example_for_each_program() -> None:
     programs = [re.search(r"pandas|duckdb|sqlite3", text) for _, text in EXAMPLES]
     assert [found[0] for found in programs if found] == ["pandas", "duckdb", "sqlite3", "sqlite3"]

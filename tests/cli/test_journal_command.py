@@ -142,6 +142,15 @@ def test_csv_has_every_change_with_both_times(record: Path, tmp_path: Path) -> N
     assert "--force requires --csv" in refused(2, "journal", "--force")
 
 
+def test_csv_of_a_run_without_an_end_says_that_it_was_running(tmp_path: Path) -> None:
+    folder = Path(os.environ["DRIVEPANEL_STATE"]) / "record"
+    words = [changes.READY, changes.FORWARD, changes.FORWARD]
+    changes.write(folder, [changes.status(second, word) for second, word in enumerate(words)])
+    run(0, "journal", "--csv", str(tmp_path / "changes.csv"))
+    (row,) = csv.DictReader((tmp_path / "changes.csv").read_text("utf-8").splitlines())
+    assert (row["kind"], row["why"]) == ("run", "still running")
+
+
 def test_unreadable_record_is_reported_beside_the_others(record: Path) -> None:
     (record / "2024-10-04_line-9.sqlite").write_bytes(b"x" * 100)
     done = ended(0, "journal")

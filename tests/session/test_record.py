@@ -382,6 +382,25 @@ def test_reads_older_than_an_hour_are_reduced_and_writes_are_kept(folder: Path) 
     assert len(reduced) in (10, 11)
 
 
+def test_last_two_files_of_a_program_that_ended_are_reduced_by_the_next_one(folder: Path) -> None:
+    for day in (3, 4):
+        written(record_path(folder, LINE, day), [row_of(day, mono=-2 * HOUR)]).abandon()
+    left = files(folder)
+    record = opened(folder)
+    record.note(read_now(1))
+    wait_until(lambda: not any(_raw_rows(path) for path in left), "they are reduced")
+    assert record.close(60)
+    assert [path.name for path in folder.glob("*-wal")] == []
+    for path in left:
+        with closing(RecordReader(path)) as reader:
+            assert [item.good for item in reader.reduced(1, REGISTER, *EVER)] == [1]
+
+
+def _raw_rows(path: Path) -> int:
+    with closing(sqlite3.connect(path)) as base:
+        return int(base.execute("SELECT count(*) FROM reply").fetchone()[0])
+
+
 def test_rows_after_all_others_were_removed_are_kept_and_reduced(folder: Path) -> None:
     file = written(record_path(folder, LINE, 3), [row_of(1, mono=-2 * HOUR)])
     file.end_window(round(START * 1e6))
@@ -416,7 +435,8 @@ def test_closed_day_that_is_too_large_loses_its_oldest_rows_only(
     file.write(rows, [EventRow(1, 1, 1, "profile", "atv71")])
     file.close(shrink=True)
     before = path.stat().st_size
-    written(record_path(folder, LINE, 4), [row_of(1)]).close()
+    for day in (4, 5):  # the recorder opens the last two
+        written(record_path(folder, LINE, day), [row_of(1)]).close()
     record = opened(folder, most=before)
     record.note(read_now(1))
     wait_until(lambda: path.stat().st_size < before, "it is smaller")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from contextlib import closing
 from datetime import datetime
 from pathlib import Path
@@ -11,11 +12,17 @@ from typing import cast
 import pytest
 
 from tests.programs import wait_until
+from tests.ui import fakes
+from tui.drive.profile import library
 from tui.drive.profile.schema import Parameter
 from tui.session.record.reader import RecordReader
 from tui.session.record.record_file import RecordFile
 from tui.session.recording import recording_file
-from tui.session.recording.recording_file import RecordingFile, values_in
+from tui.session.recording.recording_file import (
+    RecordingFile,
+    rows_of_cycle,
+    values_in,
+)
 from tui.session.recording.triggers import (
     CycleSeen,
     Trigger,
@@ -113,6 +120,14 @@ def test_rows_that_the_disk_refuses_are_written_later(
     with closing(RecordReader(file.path)) as reader:
         assert [item.word for item in reader.words(1, REGISTER, *EVER)] == [1, 2]
         assert sum(item.good for item in reader.reduced(1, REGISTER, *EVER)) == 2
+
+
+def test_value_has_the_time_of_its_reply_and_not_of_the_end_of_its_cycle() -> None:
+    now = time.monotonic()
+    reading = fakes.readings_of(library.load("atv71"), {"RFR": 300}, now - 2.0)["RFR"]
+    (row,) = rows_of_cycle(1, [reading], wall=1e9)
+    assert row.utc / 1e6 == pytest.approx(1e9 - 2.0, abs=1.0)
+    assert row.mono == round((now - 2.0) * 1e6)
 
 
 def test_failed_reads_are_recorded_and_count_as_no_values(tmp_path: Path) -> None:

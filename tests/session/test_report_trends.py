@@ -71,6 +71,14 @@ def test_last_trip_and_last_run_have_their_seconds(tmp_path: Path) -> None:
     assert run.remark == ""
 
 
+def test_last_of_two_runs_is_the_one_of_the_report(tmp_path: Path) -> None:
+    words = [READY, FORWARD, READY, FORWARD, READY]
+    rows = [records.status(10 * at, word) for at, word in enumerate(words)]
+    records.write(tmp_path, rows + [records.row(second, SPEED, 9) for second in range(50)])
+    (run,) = trends(files_of_line(tmp_path, "line-1"))
+    assert run.title.startswith("2024-10-04 22:00:30: RUN")
+
+
 def test_current_is_only_beside_a_frequency_of_the_same_cycle(tmp_path: Path) -> None:
     rows = [records.status(0, READY), records.status(1, FORWARD), records.status(9, READY)]
     rows += [records.row(second, SPEED, 100) for second in range(10)]

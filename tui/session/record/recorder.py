@@ -281,7 +281,7 @@ class LineRecorder:
         """Open files of earlier days that are not reduced, or were left by a killed program."""
         files = [path for path in files_of_line(self._folder, self._name) if path != current]
         for path in files:
-            if path is files[-1] or is_open_or_left(path):
+            if path in files[-2:] or is_open_or_left(path):  # a day ended within the last hour
                 self._files[path] = self._opened(path)
 
     def _look_after(self, now: float) -> None:
