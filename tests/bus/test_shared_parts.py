@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import pytest
+from msgspec.structs import replace
 
 from tui.bus import program_use
 from tui.bus.keep_alive import LONGEST_TIMEOUT, SHORTEST_TIMEOUT, KeepAlive, KeepAlives
 from tui.bus.notes import NOTES_KEPT, LineNote, Notes
-from tui.bus.program import KEEPER, Program
+from tui.bus.program import KEEPER, Program, pid_namespace
 from tui.bus.program_use import LEAST_USE, USE_WINDOW, ProgramUse, use_by_program
+from tui.bus.share.place import has_ended
 
 NOW = 1024.0
 
@@ -108,3 +110,31 @@ def test_use_is_shown_by_program_without_the_keeper() -> None:
     programs = [Program("b", "panel", 2), Program("k", KEEPER, 1), Program("a", "run", 2)]
     found = use_by_program(programs, {"a": 0.5})
     assert [(program.id, share) for program, share in found] == [("a", 0.5), ("b", 0.0)]
+
+
+@pytest.mark.parametrize(
+    ("error", "ended"),
+    [
+        (None, False),
+        (ProcessLookupError(), True),
+        (PermissionError(), False),
+        (OSError(), False),
+        (OverflowError(), False),
+    ],
+)
+def test_program_has_surely_ended_only_if_its_process_is_unknown(
+    error: Exception | None, ended: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    checked: list[tuple[int, int]] = []
+
+    def kill(pid: int, number: int) -> None:
+        checked.append((pid, number))
+        if error is not None:
+            raise error
+
+    monkeypatch.setattr("tui.bus.share.place.os.kill", kill)
+    here = Program("a", "run", 4711, space=pid_namespace())
+    assert has_ended(here) is ended
+    assert checked == [(4711, 0)]
+    assert not has_ended(replace(here, space="of a container"))
+    assert checked == [(4711, 0)], "the number means another process here"

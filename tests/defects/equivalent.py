@@ -107,5 +107,8 @@ EQUIVALENT: dict[str, str] = {
     ),
     "tui/bus/stop_counts.py:StopCounts.note: argument: zip(devices, counts, strict=False) ->"
     " zip(devices, counts)": ("It is the default."),
+    "tui/bus/share/polls.py:PollsServed._read: constant: 0.0 -> 1.0": (
+        "It is long ago in any case: a plan that was never read may reuse any reply of its age."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

@@ -173,6 +173,15 @@ def test_write_block_whose_first_slot_is_unused_is_refused_by_the_drive() -> Non
     assert [p.refuses for p in assignment_problems(ATV21, hole)] == [False]
 
 
+@pytest.mark.parametrize(("direction", "does"), [("read", "read"), ("write", "written")])
+def test_block_with_too_few_slots_has_a_remark(direction: str, does: str) -> None:
+    shown = block("atv21", direction)
+    plan = empty(shown).with_raw(0, 1)
+    (remark,) = assignment_problems(ATV21, plan)
+    few = f"Map more slots: at least {shown.min_words} words are {does} at once."
+    assert (remark.slot, remark.text, remark.refuses) == (shown.slots[1], few, False)
+
+
 def test_parameter_that_this_drive_lacks_is_reported() -> None:
     (wrong,) = assignment_problems(ATV71, made("atv71", "read", ["LCR"]), {"LCR"})
     assert "reports that it has no LCR" in wrong.text

@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from tui.drive.profile import library
+from tui.drive.profile.rules.registers import functions
 from tui.simulator.charts.own import OwnChart
 from tui.simulator.proving.proof_steps import prove_profile
 
@@ -198,3 +200,16 @@ def test_profile_of_single_coils_passes_its_test(tmp_path: Path) -> None:
 def test_stop_that_does_not_stop_fails(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(OwnChart, "_end", lambda *_: None)
     assert failed(FILE)["stop stops from forward"].startswith("it does not stop")
+
+
+def test_drive_of_coils_alone_needs_no_function_that_reads_registers() -> None:
+    """Any function that reads is enough, unless a parameter needs another one."""
+    data = library.load_file(FILE).data
+    (reads,) = [function for function in data.functions if function.code == 1]
+    (fan,) = [parameter for parameter in data.parameters if parameter.code == "FAN"]
+    only = replace(data, functions=[reads], parameters=[replace(fan, access="r")])
+    assert list(functions(only)) == []
+    none = replace(data, functions=[replace(reads, code=6)], parameters=[])
+    assert list(functions(none)) == [
+        (("functions",), "function 3 is missing, so nothing can be read.")
+    ]

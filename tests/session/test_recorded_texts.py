@@ -37,6 +37,19 @@ from tui.session.journal import Entry
 from tui.session.journal_reading import completed, selected
 from tui.session.record.runs import LostLink, RecordedRun
 from tui.session.report import report_text
+from tui.session.startup.guide import find_guide
+from tui.session.startup.judging import (
+    AS_REQUIRED,
+    NOT_AS_SET,
+    TICKED,
+    StepFacts,
+    _hindrances,
+    changed_codes,
+    field_fault,
+    setting_raws,
+    step_rows,
+)
+from tui.session.startup.progress import StepRecord
 
 TEXTS = Path(__file__).parent / "recorded_texts.txt"
 NOON = datetime(2026, 1, 2, 12, 0, tzinfo=UTC).timestamp()
@@ -219,7 +232,34 @@ def redactions() -> Iterator[str]:
     yield f"{[is_address(text) for text in ('10.0.0.9', '::1', '1.2', 'host', '')]}"
 
 
-SECTIONS = (past, report, counters, diagnoses, redactions)
+def start_ups() -> Iterator[str]:
+    """Each step of a guide: its rows, and what prevents its end in several states."""
+    profile = library.load("atv71")
+    none = StepFacts(profile, {}, (), (), (), False, "")
+    for step in find_guide(profile).steps:
+        rows = step_rows(step, StepRecord(state="deficient"))
+        yield f"{step.step}: {[(row.kind, row.key, row.required) for row in rows]}"
+        codes = [row.key for row in rows if row.kind in ("plate", "parameter")]
+        expected = {code: next(iter(step.expect.get(code, (40,)))) for code in codes}
+        known = none._replace(raws=expected, at_rest=True, identity="ATV71HU15M3, 0201")
+        found: dict[str, None] = {}
+        for facts, text in product(
+            (
+                none, known, known._replace(raws=dict.fromkeys(codes, 7)),
+                known._replace(staged=codes, unsaved=("ACC",)), none._replace(absent=codes),
+            ),
+            ("", "4", "0,5", "x", "ATV71HU15M3Z", "ATV71H", NOT_AS_SET, TICKED, AS_REQUIRED),
+        ):  # fmt: skip
+            record = StepRecord(entries={row.key: text for row in rows} if text else {})
+            found[f"  {text}: {list(_hindrances(step, record, facts))}"] = None
+        yield from found
+        fields = [row.field for row in rows if row.field is not None]
+        yield f"  {[field_fault(field, text) for field in fields for text in ('', 'x', '3')]}"
+        changed = StepRecord(state="done", raws=dict.fromkeys(codes, 7))
+        yield f"  {changed_codes(step, changed, expected)} {setting_raws(step, known)}"
+
+
+SECTIONS = (past, report, counters, diagnoses, redactions, start_ups)
 
 
 @pytest.fixture
