@@ -110,15 +110,10 @@ class Picture:
 
 
 def _size_of(run: Run) -> int:
-    """Bytes that a run takes at most, roughly."""
-    size, before = CURSOR_MOVE, None
-    for cell in run[2]:
-        text, ansi = cell or BLANK
-        size += 1 if text.isascii() else len(text.encode())
-        if ansi != before:
-            size += len(ansi) + len("\x1b[22;m")
-        before = ansi
-    return size
+    """Bytes of a run, roughly: each of its colors counts once."""
+    cells = [cell or BLANK for cell in run[2]]
+    text = "".join([cell[0] for cell in cells])
+    return CURSOR_MOVE + len(text.encode()) + sum(len(ansi) + 6 for ansi in {c[1] for c in cells})
 
 
 def different(

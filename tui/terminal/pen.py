@@ -127,10 +127,9 @@ class Pen:
     def write_all(self, runs: Sequence[Run]) -> None:
         """Write runs of cells, those of the present color first, then color by color."""
         order = {self._ansi: -1}
-        for number, run in enumerate(runs):
-            order.setdefault(_color_of(run), number)
-        for run in sorted(runs, key=lambda run: order[_color_of(run)]):
-            self._write(*run)
+        places = [order.setdefault(_color_of(run), number) for number, run in enumerate(runs)]
+        for number in sorted(range(len(runs)), key=places.__getitem__):
+            self._write(*runs[number])
 
     def take(self, cursor: tuple[int, int] | None = None) -> str:
         """Return the output since the last call; it ends with the cursor at a column and row."""
@@ -145,7 +144,7 @@ class Pen:
     def _write(self, x: int, y: int, cells: Sequence[Cell | None], width: int) -> None:
         """Write cells from this column and row on, in a row of `width` cells."""
         self._move(x, y)
-        place = 0
+        place = written = 0
         while place < len(cells):
             text, ansi = cells[place] or BLANK
             if ansi != self._ansi and (
@@ -153,19 +152,22 @@ class Pen:
             ):
                 self._put(from_reset(ansi) if self._ansi is None else change(self._ansi, ansi))
                 self._ansi = ansi
-            blank = self._blanks(cells, place) if text == " " else 0
-            if blank > ERASE_REST and x + place + blank == width:
-                self._put("\x1b[K")
-                return
-            if blank > CURSOR_MOVE + len(f"\x1b[{blank}X"):
-                self._put(f"\x1b[{blank}X")
-                place += blank
-                if place < len(cells):
-                    self._move(x + place, y)
-                continue
+            if text == " " and place >= written:
+                blank = self._blanks(cells, place)
+                if blank > ERASE_REST and x + place + blank == width:
+                    self._put("\x1b[K")
+                    return
+                if blank > CURSOR_MOVE + len(f"\x1b[{blank}X"):
+                    self._put(f"\x1b[{blank}X")
+                    place += blank
+                    if place < len(cells):
+                        self._move(x + place, y)
+                    continue
+                written = place + blank  # too few to erase
             self._put(text)
             place += 1
-            self._column = x + place if self._column is not None and has_known_width(text) else None
+            if self._column is not None:
+                self._column = x + place if text.isascii() or has_known_width(text) else None
         if x + place >= width:
             self._column = None  # the terminal stays at the last column, or after it
 
@@ -215,14 +217,17 @@ def move_by(count: int, forward: str, back: str) -> str:
 
 
 def has_known_width(text: str) -> bool:
-    """Return True if terminals draw a character in one cell: ASCII, lines, blocks and braille.
+    """Return True if terminals draw a symbol in one cell: lines, blocks and braille.
 
     Some draw other symbols in two cells. After one of those, the column is set, not counted.
     """
-    return text.isascii() or "\u2500" <= text <= "\u259f" or "\u2800" <= text <= "\u28ff"
+    return "\u2500" <= text <= "\u259f" or "\u2800" <= text <= "\u28ff"
 
 
 def _color_of(run: Run) -> str:
     """The first color of a run that must be set."""
-    cells = [cell or BLANK for cell in run[2]]
-    return next((ansi for text, ansi in cells if text != " " or not erasable(ansi)), cells[0][1])
+    for cell in run[2]:
+        text, ansi = cell or BLANK
+        if text != " " or not erasable(ansi):
+            return ansi
+    return (run[2][0] or BLANK)[1]
