@@ -298,3 +298,11 @@ def test_change_of_the_command_source_is_reported() -> None:
 )
 def test_settings_of_the_command_source_are_known(family: str, codes: set[str]) -> None:
     assert codes <= command_settings(library.load(family))
+
+
+def test_raw_value_is_checked_by_the_scale_without_a_parameter_that_the_drive_lacks() -> None:
+    """An Altivar 31 without a ramp increment counts in tenths; the refusal shows seconds."""
+    with pytest.raises(ValueRefused, match=r"6000\.0 s is out of range, 0\.1 s to 3276\.0 s"):
+        Edits().stage_raw(ATV31, "ACC", 60_000, {"ACC": 30}, {"Inr"})
+    with pytest.raises(ValueRefused, match="raw 60000 is out of range"):
+        Edits().stage_raw(ATV31, "ACC", 60_000, {"ACC": 30})

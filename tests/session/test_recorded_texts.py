@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import tempfile
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
@@ -24,6 +25,7 @@ from tui.bus.link import SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.ports import PortSeen
 from tui.cli.shared.diagnosis_documents import changes_document
+from tui.drive.errors import ProfileError
 from tui.drive.profile import library
 from tui.session import changes
 from tui.session.bundle.redaction import Names, Redaction, is_address
@@ -37,7 +39,7 @@ from tui.session.journal import Entry
 from tui.session.journal_reading import completed, selected
 from tui.session.record.runs import LostLink, RecordedRun
 from tui.session.report import report_text
-from tui.session.startup.guide import find_guide
+from tui.session.startup.guide import find_guide, guide_folders, read_guide
 from tui.session.startup.judging import (
     AS_REQUIRED,
     NOT_AS_SET,
@@ -259,7 +261,35 @@ def start_ups() -> Iterator[str]:
         yield f"  {changed_codes(step, changed, expected)} {setting_raws(step, known)}"
 
 
-SECTIONS = (past, report, counters, diagnoses, redactions, start_ups)
+def guide_faults() -> Iterator[str]:
+    """The faults of a guide for another family, and of one with one line changed."""
+    text = (guide_folders()[1] / "atv71.toml").read_text("utf-8")
+    for family in ("atv21", "atv312", "powerdrive"):
+        yield fault_of(text.replace('profile = "atv71"', f'profile = "{family}"', 1), family)
+    lines = text.splitlines()
+    seen: set[tuple[str, str]] = set()
+    for place, line in enumerate(lines):
+        key, is_set, value = line.partition(" = ")
+        if is_set and not line.startswith(("#", " ")) and (key, value[0]) not in seen:
+            seen.add((key, value[0]))
+            for new in ("", f"{key} = 0", f'{key} = "x"', f'{key} = ["x"]', f"{key} = [5.0, 6.0]"):
+                changed = "\n".join((*lines[:place], new, *lines[place + 1 :]))
+                yield f"{line} -> {new}: {fault_of(changed, 'atv71')}"
+
+
+def fault_of(text: str, family: str) -> str:
+    """The error of a guide with this text, or the names of its steps."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder, "guide.toml")
+        path.write_text(text, "utf-8")
+        try:
+            guide = read_guide(path, library.load(family))
+        except ProfileError as error:
+            return str(error).replace(folder, "FOLDER")
+    return f"{[step.step for step in guide.steps]}"
+
+
+SECTIONS = (past, report, counters, diagnoses, redactions, start_ups, guide_faults)
 
 
 @pytest.fixture

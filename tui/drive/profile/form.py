@@ -125,7 +125,8 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
                 return f"{value!r} has the wrong form; use {form}"
         case shapes.LiteralType(values=values):
             if value not in values or isinstance(value, bool):
-                return _instead(f"{value!r} is not an allowed value", value, values)
+                named = [text for text in values if text != ""]
+                return _instead(f"{value!r} is not an allowed value", value, named)
         case _:
             return f"must be {_kind(shape)}, not {reported}"
     return ""

@@ -73,7 +73,7 @@ class GuideStep(Table, frozen=True, kw_only=True):
     note: str = ""
     source: str = ""
     """Manual and page of the step."""
-    confidence: Confidence | Literal["practice"] | Literal[""] = ""
+    confidence: Literal[Confidence, "practice", ""] = ""
     parameters: list[str] = []
     """Codes that are set or checked."""
     plate: list[str] = []
