@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 import signal
@@ -153,6 +154,17 @@ def test_refused_recording_writes_no_file(
     assert text in done.stderr
     assert (tmp_path / "there.sqlite").read_text() == "mine"
     assert not (tmp_path / "new.sqlite").exists()
+
+
+def test_disk_without_room_for_a_file_is_refused_and_leaves_none(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    full = Mock(side_effect=OSError(errno.ENOSPC, "x"))
+    monkeypatch.setattr("tui.session.record.record_file.RecordFile._prepare", full)
+    path = tmp_path / "values.sqlite"
+    done = ended(2, "record", "sim:atv71", "RFR", "--out", path)
+    assert f"{path} cannot be written: the disk is full." in done.stderr
+    assert not path.exists()
 
 
 def test_drive_that_is_lost_and_comes_back_is_reported_once_each(

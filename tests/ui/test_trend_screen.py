@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import AbstractAsyncContextManager, asynccontextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from xml.etree import ElementTree
 
@@ -16,7 +17,9 @@ from hypothesis import strategies as st
 
 from tui.screens.trend.event_list import trend_events
 from tui.screens.trend.page import TREND_STEPS, TrendPage
+from tui.screens.trend.saving import points_of_time, svg_text
 from tui.screens.trend.screen import TrendScreen
+from tui.screens.trend.table import TableRow, value_table
 from tui.screens.trend.traces import compacted, mark_values, value_at
 from tui.screens.trend.view import samples_of_points, scale_for, trend_room
 from tui.session.events import Event
@@ -278,6 +281,30 @@ async def test_page_and_marks_are_saved_as_csv_and_svg(trend: Shown, tmp_path: P
     assert rows[0]["utc"].endswith("Z")
     drawing = ElementTree.parse(tmp_path / "saved.svg").getroot()
     assert len(drawing.findall("{*}polyline")) == 6  # a gap parts each of the three curves
+
+
+def trace_of(points: list[HistoryPoint]) -> Any:
+    return SimpleNamespace(band=BANDS[0], entry=None, unit="A", live=None, points=points)
+
+
+def test_drawing_has_no_line_over_a_time_without_replies() -> None:
+    points = [point(at, 1.0) for at in (0, 1, 2, 50, 51)]
+    assert svg_text([trace_of(points)], [points], 0, 60).count("<polyline") == 2
+
+
+def test_saved_values_are_those_of_the_time_that_was_asked_for() -> None:
+    points = [point(at, 1.0) for at in range(10)]
+    found = points_of_time(trace_of(points), History(points), 3, 6)
+    assert [item.time for item in found] == [3, 4, 5, 6]
+
+
+def test_table_has_difference_and_slope_from_mark_a_to_mark_b() -> None:
+    row = TableRow(
+        name="LCR", unit="A", digits=1, now="", at_cursor=False, at_mark=True, cursor=None,
+        at_a=None, marks=mark_values([point(0, 3.9), point(18, 3.0)], 0, 18, 30), seconds=18.0,
+    )  # fmt: skip
+    text = value_table([row], 80, present=False)[1].plain
+    assert text.split() == ["LCR", "A", "3.9", "3.0", "-0.9", "-0.050", "3.0", "3.5", "3.9"]
 
 
 async def test_old_value_has_no_number_at_the_right(trend: Shown) -> None:

@@ -6,7 +6,7 @@ import asyncio
 import math
 import time
 from collections.abc import Coroutine, Sequence
-from contextlib import closing
+from contextlib import closing, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -281,6 +281,8 @@ class Recording:
             report = len if opened.is_real and recording_is_on() else _complain
             self.file = RecordingFile(wish.path, label(opened.line.link), program, report)
         except OSError as error:
+            with suppress(OSError):
+                wish.path.unlink(missing_ok=True)  # what a full disk took of it
             text = f"{wish.path} cannot be written: {disk_words(error)}. Choose another place."
             raise Failure(text, USAGE) from None
         with closing(self.file):

@@ -33,7 +33,7 @@ def save_trend(
 ) -> int:
     """Write both files, and return the number of values. Raises OSError, also if one exists."""
     found = read_traces(files, traces, since, until)
-    merged = [_with_live(*pair, since, until) for pair in zip(traces, found, strict=True)]
+    merged = [points_of_time(*pair, since, until) for pair in zip(traces, found, strict=True)]
     drawing = path.with_suffix(".svg")
     if drawing.exists():
         raise FileExistsError(17, "The drawing exists already", str(drawing))
@@ -45,7 +45,7 @@ def save_trend(
     return sum(point.mean is not None for points in merged for point in points)
 
 
-def _with_live(
+def points_of_time(
     trace: BandTrace, history: History, since: float, until: float
 ) -> list[HistoryPoint]:
     """Return the points of a time, with those that are not in the record yet."""
