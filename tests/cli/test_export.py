@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
@@ -137,6 +138,21 @@ def test_split_writes_a_file_for_each_part_of_the_time(
         table = table_of(Path(item["file"]))
         assert len(table) == item["count"]
         assert list(table[0])[3] == LCR
+
+
+def test_parts_of_the_time_are_those_of_the_local_day(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    try:
+        with monkeypatch.context() as patch:
+            patch.setenv("TZ", "Asia/Tokyo")
+            time.tzset()
+            run(0, "export", line, "LCR", "--split", "day", "--out", tmp_path / "v.csv")
+    finally:
+        time.tzset()
+    (path,) = tmp_path.glob("v-*.csv")
+    assert path.name == "v-2024-10-05.csv"  # 22:00 of the day before in UTC
+    assert table_of(path)[0]["time local"] == "2024-10-05T07:00:00.000+09:00"
 
 
 def test_times_before_a_trigger_are_negative(tmp_path: Path) -> None:

@@ -407,6 +407,21 @@ def test_reset_while_the_drive_was_lost_has_the_seconds_that_are_not_known(folde
     assert trip.trip.tripped
 
 
+def test_reset_that_the_journal_has_noted_during_a_gap_is_listed_once(folder: Path) -> None:
+    noted = [
+        replace(
+            entry(1), kind="fault", code="OCF", new="Overcurrent", answer=answer, why="seen",
+            line="tcp:10.0.0.5", time=datetime.fromtimestamp(START + at, UTC).isoformat(),
+        )
+        for answer, at in (("tripped", 20), ("reset", 28))
+    ]  # fmt: skip
+    lines = "".join(json.dumps(asdict(item)) + "\n" for item in noted)
+    (folder.parent / JOURNAL_NAME).write_text(lines)
+    lost = [row for row in tripped(20, 40) if not START + 25 < row.utc / 1e6 < START + 39.5]
+    write(folder, lost)
+    assert [item.answer for item in found(folder).entries] == ["tripped", "reset"]
+
+
 def test_begin_of_a_record_that_does_not_reach_back_far_enough_is_reported(folder: Path) -> None:
     write(folder, each_second(0, 5, READY))
     begin = datetime.fromtimestamp(START, UTC)

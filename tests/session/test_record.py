@@ -353,6 +353,14 @@ def test_each_file_begins_with_the_profiles_of_its_drives(folder: Path) -> None:
         assert [event.text for event in events_in(path, "profile")] == ["atv71"]
 
 
+def test_event_has_the_program_that_caused_it(folder: Path) -> None:
+    file = RecordFile(record_path(folder, LINE, 3), "serial:x", "")
+    file.write((), [EventRow(1, 1, 2, "stop", "Space", "panel on pts/3")])
+    file.close()
+    (event,) = events_in(file.path, "stop")
+    assert (event.device, event.who) == (2, "panel on pts/3")
+
+
 # Old data
 
 

@@ -292,7 +292,7 @@ def test_drawing_has_no_line_over_a_time_without_replies() -> None:
     assert svg_text([trace_of(points)], [points], 0, 60).count("<polyline") == 2
 
 
-def test_saved_values_are_those_of_the_time_that_was_asked_for() -> None:
+def test_saved_values_are_those_of_the_chosen_time() -> None:
     points = [point(at, 1.0) for at in range(10)]
     found = points_of_time(trace_of(points), History(points), 3, 6)
     assert [item.time for item in found] == [3, 4, 5, 6]
