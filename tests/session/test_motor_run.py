@@ -53,7 +53,7 @@ class Rig:
         self.reads: list[object] = []
         frequency = SimpleNamespace(code="HZ")
         session = SimpleNamespace(
-            device=1, work=self.work, followed=("CMD",),
+            device=1, work=self.work, followed=("CMD",), contradiction="",
             state=lambda _: SimpleNamespace(kind=self.kind_read),
             profile=SimpleNamespace(quantity=lambda _: frequency),
         )  # fmt: skip
@@ -151,6 +151,24 @@ async def test_run_is_stopped_after_its_time(monkeypatch: pytest.MonkeyPatch) ->
     assert cast(Any, rig.run.watch) == "learned"
     assert rig.shown == sorted(set(rig.shown))
     assert len(rig.shown) > 30
+
+
+async def test_run_ends_with_a_stop_if_another_drive_answers(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its motor may run, and this run has not started it."""
+    rig = Rig(monkeypatch)
+
+    def replaced() -> None:
+        rig.console.session.contradiction = "Device 1 says it is another."
+
+    rig.after_sleep = replaced
+    with pytest.raises(MotorStopped) as caught:
+        await rig.run.carry_out()
+    text = "The run has ended: another drive answers. Device 1 says it is another."
+    assert str(caught.value) == text
+    assert rig.events[0] == ("ended", text)
+    assert rig.stops == [("stop", "a test")]
 
 
 async def test_run_left_running_is_not_stopped(monkeypatch: pytest.MonkeyPatch) -> None:

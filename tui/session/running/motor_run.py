@@ -151,6 +151,10 @@ class MotorRun:
         seen, rest = 0, 0
         while True:
             latest = latest_of(self.console)
+            if other := self.console.session.contradiction:
+                stopped = MotorStopped(f"The run has ended: another drive answers. {other}")
+                self.observer.report("ended", str(stopped))
+                raise stopped
             if latest.cycle != seen and latest.time > begun:
                 seen = latest.cycle
                 self.observer.show(latest, self._timeout_text)
