@@ -16,7 +16,7 @@ from textual.events import Key
 
 from tests.session.fake_clock import FakeClock
 from tui import safety
-from tui.bus.errors import LineLost, NoAnswer
+from tui.bus.errors import LineClosed, LineLost, NoAnswer
 from tui.bus.fake import FakeLine
 from tui.bus.gateway.server import Awake
 from tui.bus.leases import WriteLeases
@@ -54,6 +54,7 @@ from tui.session.command.stop import Stopper
 from tui.session.drive import DriveSession
 from tui.session.gateway.drives import GatewayDrives
 from tui.session.gateway.resting import RestingDrives
+from tui.session.gateway.started import StartedMotors
 from tui.session.gateway.writes import GatewayWrite
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.snapshot import Snapshot
@@ -803,6 +804,52 @@ async def test_state_counts_as_just_seen_for_two_seconds(after: float, at_rest: 
 
     reader = SimpleNamespace(profile=session.profile, session=session, read=read)
     assert await RestingDrives._is_at_rest(cast(Any, None), cast(Any, reader)) is at_rest
+
+
+async def test_gateway_reads_a_drive_at_rest_twice_in_its_timeout() -> None:
+    slept: list[float] = []
+
+    async def sleep(seconds: float) -> None:
+        slept.append(seconds)
+        if len(slept) == 2:
+            raise LineClosed
+
+    async def rests(_: object) -> bool:
+        return True
+
+    timeout = SimpleNamespace(known=True, watch=SimpleNamespace(timeout=10.0))
+    clock = SimpleNamespace(monotonic=lambda: 1000.0, sleep=sleep)
+    session = SimpleNamespace(clock=clock, timeout=None, profile=None, line=None)
+    resting = SimpleNamespace(
+        _silence=lambda _: 60.0, _is_at_rest=rests, _keep_alive=lambda _, rests: None
+    )
+
+    async def learn(*_: object) -> object:
+        return timeout
+
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("tui.session.gateway.resting.Reader", lambda _: None)
+        patched.setattr("tui.session.gateway.resting.read_timeout", learn)
+        patched.setattr("tui.session.gateway.resting._timeout", lambda _: 10.0)
+        await RestingDrives._work(cast(Any, resting), cast(Any, session))
+    assert 4 < slept[1] < 6, "the first was before its timeout was read"
+
+
+async def test_gateway_that_ends_waits_ten_seconds_for_its_motors() -> None:
+    waited: list[float] = []
+    stopper = SimpleNamespace(
+        stop=lambda *_, **__: None, wait=lambda _, seconds: waited.append(seconds)
+    )
+    keeper = SimpleNamespace(holds=lambda _: True, close=lambda: None)
+    started = SimpleNamespace(
+        _unsubscribe=lambda: None, _sessions={1: None}, _keeper=keeper, _looks={},
+        _line=None, _journal=None,
+    )  # fmt: skip
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("tui.session.gateway.started.Stopper", lambda *_: stopper)
+        await StartedMotors.end(cast(Any, started))
+    assert len(waited) == 1
+    assert 8 < waited[0] < 12
 
 
 async def test_word_that_chooses_the_chart_may_be_two_seconds_old() -> None:

@@ -31,6 +31,8 @@ it."""
 GATEWAY_SUSPENDED_AFTER: Final = 2.0
 """Seconds without a turn of its loop after which the gateway drops the commands that came in the
 meantime."""
+CLIENT_MOTORS_STOP_WITHIN: Final = 10.0
+"""Seconds that a gateway which ends waits for the standstill of its motors, to report others."""
 REQUEST_ANSWERED_WITHIN: Final = 15.0
 """Seconds that a commander has to answer a request for its drive. Then no answer means no while
 the motor runs, yes at standstill."""
@@ -155,6 +157,9 @@ ASLEEP: Final = 0.8
 READS_PER_TIMEOUT: Final = 4.0
 """Keep-alive reads in one communication timeout of a drive, so that one lost reply trips
 nothing."""
+LOOKS_PER_TIMEOUT: Final = 2.0
+"""Times in each timeout of a drive that the gateway reads if its motor is still at rest: only
+then it keeps the drive alive."""
 MARGIN: Final = 4
 """Times the worst recent turnaround: the timeout of a reply."""
 LATE_MARGIN: Final = 2.0

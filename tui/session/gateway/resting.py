@@ -14,7 +14,7 @@ from tui.bus.errors import LineClosed, LineError
 from tui.drive.chart import read_chart
 from tui.drive.orders import chart_codes
 from tui.drive.settings.writable import AT_REST
-from tui.safety import JUST_SEEN, READS_PER_TIMEOUT
+from tui.safety import JUST_SEEN, LOOKS_PER_TIMEOUT, READS_PER_TIMEOUT
 
 from ..drive import DriveSession
 from ..monitor.line_watch import LEARN_AGAIN
@@ -23,9 +23,6 @@ from ..read.presence import UNKNOWN_TIMEOUT, alive_read
 from ..read.reader import Reader
 
 log = logging.getLogger(__name__)
-
-LOOKS_PER_TIMEOUT = 2.0
-"""Reads of the state in each timeout of a drive whose motor is at rest."""
 
 
 class RestingDrives:

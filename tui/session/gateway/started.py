@@ -12,6 +12,7 @@ from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed, LineError
 from tui.bus.line_events import DevicesStopped, LineEvent
 from tui.drive.foreign_write import StartDirection
+from tui.safety import CLIENT_MOTORS_STOP_WITHIN
 
 from ..command.stop import Stopper
 from ..command.stop_report import StopSummary
@@ -25,8 +26,6 @@ log = logging.getLogger(__name__)
 STANDSTILL_LOOK = 0.5
 LONGEST_LOOK = 300.0
 """Seconds after a stop for which the motor is read, to see its standstill."""
-CLIENT_MOTORS_STOP_WITHIN = 10.0
-"""Seconds that a gateway which ends waits for the standstill of its motors."""
 
 
 class StartedMotors:
