@@ -402,9 +402,10 @@ def test_heading_of_a_low_bandwidth_link_has_room_for_the_names_of_few_marks() -
             assert [name for name in marks.values() if MARK_SIGNS[name][2] not in text] == []
 
 
-def test_low_bandwidth_link_gets_the_state_alone_before_the_first_values() -> None:
-    room, base = arrange(80, 24, 9, lean=True), view_of(ATV71, fakes.RUNNING)
-    waiting = replace(base, snapshot=None, lean=True)
+def test_state_is_drawn_alone_before_the_first_values() -> None:
+    """On a slow link, frames of nothing would delay them."""
+    room, base = arrange(80, 24, 9), view_of(ATV71, fakes.RUNNING)
+    waiting = replace(base, snapshot=None)
     drawn = {
         place: [row.plain.strip() for row in rows if row.plain.strip()]
         for place, rows in monitor_parts(waiting, room, watched_words(ATV71)).items()

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
+from tui.bus.model import LineStatus
 from tui.drive.profile.profile import Profile, is_verified, mark_of
 from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
@@ -235,8 +236,8 @@ def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> 
     Each part has exactly its number of rows; a notice may add some to the message.
     """
     lead = [Text("")] * room.lead
-    if view.lean and view.snapshot is None and view.stop is None:
-        # frames of nothing would delay the first values on a slow link
+    if view.snapshot is None and view.stop is None and view.line.status is LineStatus.CONNECTED:
+        # frames of nothing would delay the first values, on a slow link by a second
         waits = [*lead, Text(" ").append_text(state_lines(view, room.state_width - 4)[0])]
         rest = {place: [Text("")] for place in ("readouts", "motor", "curve")}
         return {**rest, "state": waits, "message": [Text("")] * room.bottom}
