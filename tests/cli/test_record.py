@@ -180,7 +180,7 @@ def test_drive_that_is_lost_and_comes_back_is_reported_once_each(
     for cycle in (good, lost, lost, good, good):
         work._take(drive, cycle)
     assert capsys.readouterr().err.splitlines() == [
-        "drivepanel: Device 2 did not answer. Still trying.",
+        "drivepanel: Device 2 did not answer.",
         "drivepanel: Device 2 is recorded again.",
     ]
 

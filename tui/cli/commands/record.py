@@ -353,7 +353,7 @@ class Recording:
         device, readings = drive.session.device, with_text(snapshot.readings)
         if bool(snapshot.error) != bool(drive.error):
             again = f"Device {device} is recorded again."
-            _complain(f"{snapshot.error} Still trying." if snapshot.error else again)
+            _complain(snapshot.error or again)
         drive.error = snapshot.error
         texts = drive.fired(snapshot)
         rows = rows_of_cycle(device, [readings[code] for code in drive.codes], snapshot.wall)
