@@ -334,4 +334,28 @@ DEFECTS = (
         "Monitor shows a value from before a write as the present one.",
         ("tests/session/test_reader.py::test_poll_takes_slow_values_that_lie_between_the_others",),
     ),
+    Defect(
+        "replay-counts-late",
+        "tui/session/record/replay_line.py",
+        "following = (now + 2 * BEFORE_SECOND) // COUNTED_EVERY + 1",
+        "following = (now + 2 * BEFORE_SECOND) // COUNTED_EVERY + 1.5",
+        "Line quality of a replay counts requests in the wrong second.",
+        ("tests/session/test_replay.py::test_exchanges_of_a_replay_are_counted_in_their_second",),
+    ),
+    Defect(
+        "replay-monitored-since-its-begin",
+        "tui/session/replay.py",
+        "cycles[0].last.ended / 1e6 if cycles",
+        "line.clock.begin if cycles",
+        "Faults of a replay says that the drive was monitored before it was.",
+        ("tests/session/test_replay.py::test_monitoring_began_with_the_first_cycle_of_the_record",),
+    ),
+    Defect(
+        "replay-cuts-a-block",
+        "tui/session/record/newest.py",
+        "if register in read and reply.function == BLOCK_FUNCTION",
+        "if register in read[:-1] and reply.function == BLOCK_FUNCTION",
+        "A replay lacks the value in the last register of a block.",
+        ("tests/session/test_replay.py::test_each_register_of_a_block_is_the_value_in_it",),
+    ),
 )

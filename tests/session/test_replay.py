@@ -619,9 +619,45 @@ async def test_values_that_came_by_a_block_are_shown_as_live(tmp_path: Path) -> 
         found = fleet.consoles[0].latest
         fleet.forget()
     assert found is not None
+    assert found.block == "Read block"
     assert found.state.kind == console.latest.state.kind == "running"
     assert {item.quality for item in found.readings.values()} == {Quality.GOOD}
     history = read_history([path], 1, "FD00", BEGIN, BEGIN + 60)
     apart = [b.time - a.time for a, b in pairwise(history.points)]
     assert max(apart) < 1
     assert history.points[-1].time > BEGIN + 49
+
+
+def test_monitoring_began_with_the_first_cycle_of_the_record(tmp_path: Path) -> None:
+    """Not with the requests before it, such as those of a search."""
+    rows = [row(at, (0x0637, 300, 300, 84), address=3201) for at in range(5, 50)]
+    profile = event(0.5, "profile", json.dumps({"profile": "atv71"}), 1)
+    diagnosis = row(0.1)._replace(function=8, address=None)
+    search = diagnosis, row(0.2, (7,), address=12000)
+    path = record(tmp_path, *search, *rows, events=(profile,))
+    with replayed_drive(path, 40, None) as (_, console):
+        assert console.recorder.since == pytest.approx(BEGIN + 5, abs=1e-3)
+
+
+@pytest.mark.parametrize("at", [9.9, 10.0])
+async def test_exchanges_of_a_replay_are_counted_in_their_second(at: float, tmp_path: Path) -> None:
+    """The figures of the last minute are by seconds: late counts are in a wrong one."""
+    times = [round(0.25 * number, 2) for number in range(1, 60)]
+    with replayed(record(tmp_path, *(row(each, (1,)) for each in times)), 0.25) as line:
+        await line.run_to(BEGIN + at)
+        counted = line._tally.frozen().requests
+    assert counted == len([each for each in times if 0.25 < each < int(at)])
+
+
+def test_each_register_of_a_block_is_the_value_in_it(tmp_path: Path) -> None:
+    note = json.dumps({"places": {"50": "A", "51": "B", "52": "C"}, "since": 0})
+    rows = row(1, (1, 2, 3), address=50), row(2, (4, 5), address=50), row(2.02, (6,), address=52)
+    path = record(tmp_path, *rows, events=(event(0.5, "block", note, 1),))
+    codes = {"A": (3, 100), "B": (3, 200), "C": (3, 300)}
+    for at, values in ((1.5, (1, 2, 3)), (2.5, (4, 5, 6))):
+        with replayed(path, at) as line:
+            assert words(line, 50) == values[:1]  # counts may be read before the profile is known
+            line.use_profile(1, lambda place: None, codes.get)
+            assert [*words(line, 100), *words(line, 200), *words(line, 300)] == [*values]
+            found, _ = cycles_of(line, 1, BEGIN, [])
+            assert [cycle.block for cycle in found] == [50, 52]

@@ -66,6 +66,8 @@ class PolledTurn:
         times = (reply.time for reply in replies.values() if isinstance(reply, Reply))
         self.ended = max(times, default=begun)
         """The time of the last reply."""
+        self.block: int | None = None
+        """In a replay, the register from which it read values of a block; None without one."""
 
     @property
     def differs(self) -> bool:

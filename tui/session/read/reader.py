@@ -85,9 +85,12 @@ class Reader:
         if polled is not None:
             self._polled = polled
             try:
-                return await self.read(codes, priority=priority)
+                found = await self.read(codes, priority=priority)
             finally:
                 self._polled = None
+            if polled.block is not None and (block := self._block_at(polled.block)):
+                self.using = block.name
+            return found
         wanted = list(dict.fromkeys(codes))
         await self._read_sources(wanted, priority)
         found = await self._take(frozenset(wanted), priority)
@@ -335,8 +338,11 @@ class Reader:
         first = request.places[0]
         if self.profile[first.code].address == request.address + first.offset:
             return None
+        return self._block_at(request.address)
+
+    def _block_at(self, address: int) -> Block | None:
         blocks = self.profile.data.blocks
-        return next((b for b in blocks if 0 <= request.address - b.address < b.max_words), None)
+        return next((b for b in blocks if 0 <= address - b.address < b.max_words), None)
 
     async def _alone(self, parameter: Parameter, priority: Priority) -> Reading:
         count = word_count(parameter)

@@ -29,6 +29,8 @@ class RepeatedCycle(NamedTuple):
 
     begun: int
     last: RecordedReply
+    block: int | None = None
+    """Register from which it read values of a block; None without one."""
 
 
 def cycles_of(
@@ -47,19 +49,21 @@ def cycles_of(
         # a silent drive fails the next cycle too, whatever was requested first
         silent = before is not None and min(before.quality, reply.quality) > REFUSED
         before = reply
-        if reply.function not in RECORDED_READS or not (
-            silent or _concerns(reply, reads) or _has_block(line, device, reply)
-        ):
+        if reply.function not in RECORDED_READS:
+            continue
+        block = reply.address if _has_block(line, device, reply) else None
+        if block is None and not (silent or _concerns(reply, reads)):
             continue
         place = reply.function, reply.address, reply.registers
         last = found[-1].last if found else None
         is_next = last is None or not is_repeated(last, reply)
         pause = 0.0 if last is None else (reply.sent - last.ended) / 1e6
         if is_next and (last is None or place in places or pause > PAUSE_OF_CYCLES):
-            found.append(RepeatedCycle(reply.sent, reply))
+            found.append(RepeatedCycle(reply.sent, reply, block))
             places = set()
         else:
-            found[-1] = found[-1]._replace(last=reply)
+            block = found[-1].block if block is None else block
+            found[-1] = found[-1]._replace(last=reply, block=block)
         places.add(place)
     return found, len(replies) < ROWS_AHEAD
 
@@ -85,6 +89,7 @@ class RepeatedTurn(PolledTurn):
     def __init__(self, line: ReplayLine, device: int, cycle: RepeatedCycle) -> None:
         super().__init__(0, cycle.begun / 1e6, {})
         self.ended = cycle.last.ended / 1e6
+        self.block = cycle.block
         self._line, self._device, self._last = line, device, cycle.last
 
     def take(self, read: PlannedRead, after: float) -> Reply | None:

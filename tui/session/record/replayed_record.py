@@ -162,6 +162,7 @@ class ReplayedRecord:
             return {register: place for register, place in places.items() if place is not None}
 
         with self._lock:
+            self._newest.pop(device, None)  # it may have taken words of a block already
             newest = self._newest_of(device)
             newest.mean_of, newest.in_block = mean_of, in_block
 
