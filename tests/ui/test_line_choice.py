@@ -25,6 +25,7 @@ from tui.screens.connection.choices import (
     same_line,
 )
 from tui.screens.connection.drive_list import DriveList
+from tui.screens.connection.line_list import list_width
 from tui.screens.connection.state import QUIET
 from tui.screens.monitor.screen import MonitorScreen
 from tui.session.connect.open_line import OpenLine, open_line
@@ -57,7 +58,7 @@ class Line:
         # at any address: a check every 50 ms may miss the first
         await until(
             self.pilot,
-            lambda: re.search(r" Scan \d+ of \d", shown(self.app, "search")) is not None,
+            lambda: re.search(r" Scan +\d+ of \d", shown(self.app, "search")) is not None,
         )
 
     @property
@@ -283,3 +284,9 @@ def test_style_of_a_mark_is_not_that_of_the_whole_line(mark: ListMark) -> None:
     text = choice_line(LineChoice("/dev/ttyUSB0", "USB-RS485 adapter"), 60, mark)
     assert not text.style
     assert len(text.spans) == 3
+
+
+@pytest.mark.parametrize("width", [80, 120, 200])
+def test_list_of_lines_without_drives_shows_whole_descriptions(width: int) -> None:
+    choice = LineChoice("/dev/ttyUSB0", "USB-RS485 adapter", path="/dev/ttyUSB0")
+    assert choice_line(choice, list_width(width) - 1).plain.endswith("USB-RS485 adapter")

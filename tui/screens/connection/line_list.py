@@ -157,5 +157,5 @@ class LineList(OptionList):
 
 
 def list_width(width: int) -> int:
-    """Return the columns that the style sheet gives the list on a terminal of `width` columns."""
-    return max(22, min(32, width * 32 // 100))
+    """Return the columns of the list in the style sheet, without drives, on so wide a terminal."""
+    return max(22, min(44, width * 44 // 100 - 1))

@@ -28,7 +28,7 @@ UNNAMED_VALUE = "unknown (99)"
 """A value without a name in a list that has names, at its usual length."""
 TEXT_MOST = 28
 """Cells of a value at most, in a list with long names of values."""
-LEAST_NAME, LEAST_STAGED_NAME = 31, 22
+LEAST_NAME, LEAST_STAGED_NAME = 25, 22
 """Cells of the names that long values leave them; fewer next to staged values."""
 STAGED_MARK = 3
 """Cells of the arrow before a staged value."""
