@@ -26,8 +26,9 @@ from tui.session.changes import (
 from tui.session.journal_file import JOURNAL_NAME
 from tui.session.record.record_file import RecordFile
 from tui.session.record.ring import record_path
-from tui.session.record.runs import LostLink, RecordedRun
+from tui.session.record.runs import RecordedRun
 from tui.session.record.schema import GOOD, SILENT, EventRow, ReplyRow
+from tui.session.record.silences import LostLink
 
 from .test_journal import entry
 
@@ -362,6 +363,25 @@ def test_trips_of_two_drives_are_kept_apart(folder: Path) -> None:
     first, second = found(folder).trips
     assert (first.device, first.trip.code, first.trip.reset) == (1, "ObF", "later")
     assert (second.device, second.trip.reset) == (2, "")
+
+
+@pytest.mark.parametrize(
+    ("failed", "answered", "lost"),
+    [
+        ((11.0, 11.2, 11.4, 12.7), 20, [(11.0, 20.0)]),  # it was polled ever less often
+        ((11.0, 11.2, 11.4), 20, []),  # one request with its tries
+        ((11.0, 11.2, 12.7), 14, []),  # short
+        ((11.0, 11.2, 11.4, 12.7), 200, []),  # no program polled it
+    ],
+)
+def test_drive_whose_status_word_is_not_read_is_a_lost_link(
+    failed: tuple[float, ...], answered: int, lost: list[tuple[float, float]], folder: Path
+) -> None:
+    rows = [row(second, LAST_FAULT, 5) for second in (*range(11), answered)]
+    rows += [row(second, LAST_FAULT, None) for second in failed]
+    write(folder, sorted(rows, key=lambda item: item.utc))
+    losses = [(item.loss.begun - START, item.loss.ended) for item in found(folder).losses]
+    assert [(begun, (ended or 0.0) - START) for begun, ended in losses] == lost
 
 
 def test_every_change_has_a_text() -> None:

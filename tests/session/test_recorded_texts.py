@@ -37,7 +37,8 @@ from tui.session.diagnosis.measure import Measure
 from tui.session.diagnosis.reply_evidence import ReplyEvidence
 from tui.session.journal import Entry
 from tui.session.journal_reading import completed, selected
-from tui.session.record.runs import LostLink, RecordedRun
+from tui.session.record.runs import RecordedRun
+from tui.session.record.silences import LostLink
 from tui.session.report import report_text
 from tui.session.startup.guide import find_guide, guide_folders, read_guide
 from tui.session.startup.judging import (

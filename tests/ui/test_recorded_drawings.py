@@ -46,7 +46,8 @@ from tui.session.changes import ChangeList, LineLoss, LineRun
 from tui.session.counters.compare import Bounds, Comparison, DriveCount, TurnaroundBar, differences
 from tui.session.counters.watch import CountersNow
 from tui.session.record.decoding import HistoryPoint
-from tui.session.record.runs import LostLink, RecordedRun
+from tui.session.record.runs import RecordedRun
+from tui.session.record.silences import LostLink
 from tui.widgets.replay_bar import NO_MOTOR
 
 TEXTS = Path(__file__).parent / "recorded_drawings.txt"

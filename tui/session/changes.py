@@ -19,7 +19,8 @@ from .journal_reading import DamagedLine, completed, read_journal, selected, tim
 from .record.ring import DAMAGED_MARK, RECORD_SUFFIX, SECONDS_A_DAY, day_of_record
 
 if TYPE_CHECKING:
-    from .record.runs import LostLink, RecordedRun, RecordedTrip, RecordEvents
+    from .record.runs import RecordedRun, RecordedTrip, RecordEvents
+    from .record.silences import LostLink
     from .report import Trip
 
 _SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}

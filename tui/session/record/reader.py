@@ -12,11 +12,15 @@ from tui.wire.frames import BIT_READS, at_place
 
 from .reduction import Extent, extent_of
 from .schema import (
+    DAMAGED,
     GOOD,
     QUALITIES,
     RECORD_ID,
     RECORD_VERSION,
     RECORDED_READS,
+    REFUSED,
+    SILENT,
+    WRONG,
     EventRow,
     RecordDamaged,
     ReplyRow,
@@ -25,6 +29,8 @@ from .unfolding import unfold
 
 MOST_FILES = 11
 """Files that are read as one: SQLite joins no more."""
+_BAD = SILENT, DAMAGED, WRONG
+"""Qualities of a request that the device did not answer."""
 FIRST_ROWS = 2000
 """Rows among which the oldest one is searched."""
 ROWS_AT_A_TIME = 1000
@@ -199,6 +205,31 @@ class RecordReader:
             for table in ("reply", "reduced")
         ]
         return min((utc for utc in times if utc is not None), default=None)
+
+    def silences(self, device: int) -> Iterator[tuple[int, int, int | None, int]]:
+        """Yield each time without an answer to any request of a device, from replies that are kept.
+
+        Its parts are the first and the last bad reply, the next answer, and the number of bad ones.
+        """
+        answer: int | None = -(1 << 62)
+        while answer is not None:
+            (begun,) = self._base.execute(
+                f"SELECT min(utc) FROM reply WHERE device = ? AND utc > ? AND quality IN {_BAD}",
+                (device, answer),
+            ).fetchone()
+            if begun is None:
+                return
+            (answer,) = self._base.execute(
+                "SELECT min(utc) FROM reply WHERE device = ? AND utc > ? AND quality IN (?, ?)",
+                (device, begun, GOOD, REFUSED),
+            ).fetchone()
+            until = 1 << 62 if answer is None else answer
+            last, count = self._base.execute(
+                "SELECT max(utc), count(*) FROM reply WHERE device = ? AND utc >= ? AND utc < ?"
+                f" AND quality IN {_BAD}",
+                (device, begun, until),
+            ).fetchone()
+            yield begun, last, answer, count
 
     def notes_of(self, device: int, kind: Literal["profile", "block"]) -> list[tuple[int, str]]:
         """Return the events that name the profile of a drive, or its block, with their `utc`."""

@@ -27,13 +27,10 @@ from .decoding import HistoryPoint, joined_points
 from .history import History, number_text, read_history
 from .reader import RecordReader
 from .schema import EventRow, RecordDamaged, to_microseconds
+from .silences import LostLink, whole_silences, word_silences
 
 UNREAD_FOR = 60.0
 """Seconds without a reading of the status word after which a run is not known."""
-LEAST_SILENCE = 5.0
-"""Seconds without a good reply from which the link to a drive was lost."""
-LEAST_BAD = 3
-"""Bad replies from which the link to a drive was lost."""
 READ_AFTER = 2.0
 """Seconds after the last status word in which the fault word of the same cycle is read."""
 COMMANDED_BEFORE = 10.0
@@ -87,17 +84,6 @@ class RecordedTrip(NamedTuple):
     """Seconds by which `begun` may be wrong. None: it was in fault when first read."""
     end_within: float | None = None
     """Seconds by which `ended` may be wrong: the drive may have been reset while it was lost."""
-
-
-class LostLink(NamedTuple):
-    """A time in which the line or a drive did not answer."""
-
-    device: int | None
-    """None for the whole line."""
-    begun: float
-    ended: float | None
-    """None if it was still lost at the end."""
-    reason: str
 
 
 class DriveHistory(NamedTuple):
@@ -194,7 +180,14 @@ def history_of(
     runs = [_described(line, device, profile, chart, references, span) for span in spans]
     faults = read(profile.data.faults.parameter)
     trips = list(_trips(device, profile, states, kinds, faults))
-    return DriveHistory(runs, trips, list(_silences(device, points)))
+    losses = list(word_silences(device, points))
+    losses += [
+        each
+        for each in whole_silences(line.files, device, since, until)
+        if not any(each.begun <= (loss.ended or until) and loss.begun <= (each.ended or until)
+                   for loss in losses)
+    ]  # fmt: skip
+    return DriveHistory(runs, trips, sorted(losses, key=lambda loss: loss.begun))
 
 
 def _kind_of(chart: Chart, word: int) -> StateKind:
@@ -373,20 +366,3 @@ def _last_writer(files: Sequence[Path], device: int, place: int, since: float, u
             if who := reader.last_writer(device, place, *times):
                 return who
     return ""
-
-
-def _silences(device: int, points: Iterable[HistoryPoint]) -> Iterator[LostLink]:
-    """Yield the times without a good reply to reads of the status word."""
-    begun, last, bad, reason = 0.0, 0.0, 0, ""
-    for point in points:
-        if not point.good:
-            if not bad:
-                begun = point.time
-                reason = "" if point.reduced else point.quality
-            bad, last = bad + point.bad, point.end
-            continue
-        if bad >= LEAST_BAD and point.time - begun >= LEAST_SILENCE:
-            yield LostLink(device, begun, point.time, reason)
-        bad = 0
-    if bad >= LEAST_BAD and last - begun >= LEAST_SILENCE:
-        yield LostLink(device, begun, None, reason)
