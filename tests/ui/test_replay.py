@@ -15,6 +15,7 @@ from tui.app import DrivePanelApp
 from tui.drive.profile import library
 from tui.screens.dialogs.ask import Ask
 from tui.screens.keys.table import TABBED
+from tui.screens.trend.screen import TrendScreen
 from tui.session.connect.open_line import OpenLine, demo_line, open_line
 from tui.session.journal import Journal
 from tui.widgets.lines import Lines
@@ -169,6 +170,24 @@ async def test_monitor_reads_on_after_trend_was_opened_from_line(run: Path) -> N
             await made.until(lambda place=place: made.app.place == place)  # type: ignore[misc]
             await made.pilot.pause()
         assert monitor.started
+
+
+async def test_marks_of_trend_stay_when_a_replay_goes_to_another_time(run: Path) -> None:
+    async with replaying(run, at=50) as made:
+        await made.pilot.press("8")
+        await made.until(lambda: made.app.place == "trend")
+        before = made.app.screen
+        assert isinstance(before, TrendScreen)
+        await made.pilot.press("M")
+        await made.pilot.press(">")
+        marked = before.page.mark_a
+        assert marked is not None
+        await made.pilot.press("comma")
+        await made.until(lambda: made.app.place == "trend" and made.app.screen is not before)
+        after = made.app.screen
+        assert isinstance(after, TrendScreen)
+        assert (after.page.mark_a, after.page.step) == (marked, before.page.step)
+        assert not after.page.held
 
 
 async def test_hold_and_speed_keys(run: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from tui.bus.errors import LineError
 
@@ -20,6 +20,14 @@ if TYPE_CHECKING:
 NO_REPLAY = "This key is for a replay. To open one, end the panel and run: drivepanel replay FILE"
 EVENT_LEAD = 2.0
 """Seconds before an event at which a jump to it ends."""
+
+
+@runtime_checkable
+class Resumable(Protocol):
+    """A screen that keeps what a person has set on it when a replay goes to another time."""
+
+    def resume(self, before: object) -> None:
+        """Continue the screen that was shown before."""
 
 
 class ReplayKeys(StatusRefresher, LineOwner, Places):
@@ -127,7 +135,7 @@ class ReplayKeys(StatusRefresher, LineOwner, Places):
         before = next((item for item in self.panel_lines if item.opened.replay is replay), None)
         if before is None:
             return
-        chosen, place = self.chosen, self.place
+        chosen, place, shown = self.chosen, self.place, self.screen
         device = chosen.device if chosen in before.fleet.consoles and chosen is not None else None
         when = datetime.fromtimestamp(at).astimezone().isoformat()
         text = f"{before.opened.text.partition(',at=')[0]},at={when}"
@@ -152,6 +160,8 @@ class ReplayKeys(StatusRefresher, LineOwner, Places):
             self.show_monitor(console)
             if place != MONITOR:
                 self.show_place(place, console)
+                if isinstance(self.screen, Resumable):
+                    self.screen.resume(shown)
         before.fleet.forget()
         await asyncio.to_thread(before.opened.close)
 

@@ -62,6 +62,11 @@ class TrendScreen(BandKeys):
         self._set_bands(stored_bands(self._line_key) or first_bands(self.console))
         self.set_timer(AGAIN_AFTER, self._load)
 
+    def resume(self, before: object) -> None:
+        """Keep the marks and the length of the page; it follows the new time."""
+        if isinstance(before, TrendScreen):
+            self.page = before.page.run()
+
     def draw(self, width: int) -> None:
         """Draw the bands with what was read since."""
         super().draw(width)
