@@ -225,6 +225,21 @@ async def test_live_line_beside_a_replay_is_stopped_by_its_keys(run: Path, key: 
         assert any("live lines" in item.text for item in app.events.events)
 
 
+async def test_replay_beside_a_live_line_can_be_shown_again(run: Path) -> None:
+    async with replaying(run) as made:
+        app = made.app
+        replay = app.panel_lines[0]
+        await app.connect(LIVE, remember=False)
+        await made.pilot.press("1")
+        await made.until(lambda: app.place == "line")
+        await made.until(lambda: "REPLAY" not in made.shown("strip"))
+        listed = app.connection.lines
+        listed.offer(LIVE)
+        listed.fill(app.line_text, app.open_texts)
+        texts = [choice.text for choice in listed._choices.values()]
+        assert texts.count(replay.opened.text) == 1
+
+
 def newest(made: Panel) -> str:
     event = made.app.events.newest
     return event.text if event is not None else ""

@@ -9,7 +9,7 @@ from textual.events import Resize
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
-from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
+from tui.session.connect.line_key import SIMULATED_PREFIX, is_replay, line_key
 from tui.session.connect.named_lines import line_settings
 from tui.session.connect.port_settings import port_of
 from tui.session.paths import recent_lines
@@ -39,6 +39,8 @@ class LineList(OptionList):
         """Key of the shown line; empty if there is none."""
         self._open: frozenset[str] = frozenset()
         """Keys of all open lines."""
+        self._replays: tuple[str, ...] = ()
+        """Open replays, which are not among the recent lines."""
         self._faulty: frozenset[str] = frozenset()
         """Keys of the open lines with a drive in fault."""
         self._named = ""
@@ -104,6 +106,7 @@ class LineList(OptionList):
         self._faulty = frozenset(line_key(text) for text in faulty)
         self._here = line_key(shown) if shown else ""
         self._open = frozenset(line_key(text) for text in opened if text)
+        self._replays = tuple(dict.fromkeys(text for text in opened if is_replay(text)))
         self._fill()
 
     def on_resize(self, event: Resize) -> None:
@@ -119,7 +122,10 @@ class LineList(OptionList):
         at = self.highlighted
         chosen = None if at is None else self.get_option_at_index(at).id
         self._choices.clear()
-        options = [option for group in self._groups for option in self._rows(group, width)]
+        listed = {choice.text for group in self._groups for choice in group.choices}
+        more = tuple(LineChoice(text, "") for text in self._replays if text not in listed)
+        shown = [Group("Replays", more), *self._groups] if more else self._groups
+        options = [option for group in shown for option in self._rows(group, width)]
         self.clear_options()
         self.add_options(options)
         first = next((at for at, option in enumerate(options) if not option.disabled), None)
