@@ -661,3 +661,36 @@ def test_each_register_of_a_block_is_the_value_in_it(tmp_path: Path) -> None:
             assert [*words(line, 100), *words(line, 200), *words(line, 300)] == [*values]
             found, _ = cycles_of(line, 1, BEGIN, [])
             assert [cycle.block for cycle in found] == [50, 52]
+
+
+def test_drive_that_answers_again_is_not_silent(tmp_path: Path) -> None:
+    silent = (row(at, registers=1, quality=SILENT) for at in (2, 3, 4))
+    rows = [row(1, (10,)), *silent, row(5, (11,), address=900)]
+    with replayed(record(tmp_path, *rows), 1.5) as line:
+        assert words(line) == (10,)
+        line.clock.skip_to(BEGIN + 4.5)
+        with pytest.raises(NoAnswer):
+            words(line, 900)
+        line.clock.skip_to(BEGIN + 5.5)
+        assert words(line, 900) == (11,)
+        assert line.device_state(1).failures == 0
+
+
+def test_replay_plays_up_to_its_end_and_no_further(tmp_path: Path) -> None:
+    with replayed(record(tmp_path, *(row(at, (1,)) for at in range(1, 4))), 1) as line:
+        line.clock.set_speed(100.0)
+        line.clock.play()
+        end = time.monotonic() + 5
+        while line.clock.playing and time.monotonic() < end:
+            time.sleep(0.01)
+        time.sleep(0.05)
+        assert line.clock.monotonic() == line.clock.end
+
+
+def test_profile_that_has_changed_since_is_reported(tmp_path: Path) -> None:
+    rows = [row(at, (0x0637,), address=3201) for at in (1, 2)]
+    named = event(0.5, "profile", json.dumps({"profile": "atv71", "hash": "0" * 64}), 1)
+    with replayed(record(tmp_path, *rows, events=(named,)), 2) as line:
+        fleet = Fleet(line, UnwrittenJournal(), None, None, line.clock)
+        assert take_drives(line, fleet) == [replay.OTHER_PROFILE.format(device=1, profile="atv71")]
+        fleet.forget()
