@@ -155,9 +155,11 @@ async def test_seek_back_and_forward_shows_the_state_of_then(run: Path) -> None:
 
         begun = app.clock.monotonic() - BEGIN  # the replay may have played for a moment
         await made.until(lambda: shows(begun))
+        assert app.replay is not None
+        app.replay.clock.set_speed(5.0)
         await made.pilot.press("comma", "comma")
         await made.until(lambda: shows(begun - 10))
-        assert app.replay is not None
+        assert (app.replay.clock.speed, app.replay.clock.playing) == (5.0, False)
         assert abs(app.clock.monotonic() - BEGIN - (begun - 10)) < 0.1
         await made.pilot.press(";")
         await made.until(lambda: shows(begun - 5))
