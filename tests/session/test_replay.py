@@ -693,4 +693,7 @@ def test_profile_that_has_changed_since_is_reported(tmp_path: Path) -> None:
     with replayed(record(tmp_path, *rows, events=(named,)), 2) as line:
         fleet = Fleet(line, UnwrittenJournal(), None, None, line.clock)
         assert take_drives(line, fleet) == [replay.OTHER_PROFILE.format(device=1, profile="atv71")]
+        session = fleet.consoles[0].session
+        assert session.arming.hindrance == REPLAY_SENDS_NOTHING
+        assert not session.reads_blocks
         fleet.forget()
