@@ -319,6 +319,15 @@ def test_values_at_the_cursor_are_whole(raws: dict[str, int], size: tuple[int, i
     assert [word for value in values if (word := f"{value:.1f}") not in heading.plain] == []
 
 
+def test_extremes_keep_their_distance_from_their_names() -> None:
+    points = tuple(TrendPoint(fakes.NOW - at, (-25.0 * at, 8.4, -50.0)) for at in (0, 1))
+    view = replace(view_of(ATV71, fakes.REVERSE), trend=points)
+    rows = monitor_parts(view, arrange(80, 24, 9), watched_words(ATV71))["readouts"]
+    text = "\n".join(row.plain for row in rows)
+    assert "min -25.0" in text
+    assert "max   0.0" in text
+
+
 @pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])
 def test_cursor_on_a_mark_names_the_program_that_caused_it(size: tuple[int, int]) -> None:
     room, base = arrange(*size, 9), replace(running_view(1000.0), apart=0.0, me="panel (pid 1)")
