@@ -27,6 +27,8 @@ from tui.simulator import DriveSpec, Simulation
 
 ROWS, COLUMNS = 24, 80
 CONTROL = re.compile(r"\x1b\[(?P<arguments>[0-9;?<>=]*)[$]?(?P<final>[A-Za-z])|\x1b\][^\x07]*\x07")
+STEPS = {"A": (-1, 0), "B": (1, 0), "C": (0, 1), "D": (0, -1)}
+"""Rows and columns of one step of the cursor, by the final byte of its sequence."""
 WRITES = {5, 6, 15, 16, 22, 23}
 """Functions of Modbus that write."""
 SPLIT = 0.02
@@ -173,9 +175,14 @@ class PtyPanel:
             if control["final"] == "H":
                 row, _, column = control["arguments"].partition(";")
                 self._at = (int(row or 1) - 1, int(column or 1) - 1)
-            elif control["final"] == "X":
+            elif control["final"] in STEPS:
+                steps = int(control["arguments"] or 1)
+                row_step, column_step = STEPS[control["final"]]
+                self._at = (self._at[0] + row_step * steps, self._at[1] + column_step * steps)
+            elif control["final"] in "XK":
                 row_at, column_at = self._at
-                for erased in range(int(control["arguments"] or 1)):
+                rest = COLUMNS - column_at if control["final"] == "K" else 1
+                for erased in range(int(control["arguments"] or rest)):
                     self.cells[row_at, column_at + erased] = " "
         end = text.find("\x1b", at)
         self._put(text[at : end if end >= 0 else len(text)])
@@ -184,8 +191,15 @@ class PtyPanel:
     def _put(self, text: str) -> None:
         row, column = self._at
         for character in text:
-            self.cells[row, column] = character
-            column += 1
+            if character == "\r":
+                column = 0
+            elif character == "\n":
+                row += 1
+            elif character == "\b":
+                column -= 1
+            else:
+                self.cells[row, column] = character
+                column += 1
         self._at = (row, column)
 
     def text(self) -> str:
