@@ -38,6 +38,11 @@ MOST_TESTS = 60, 80
 """Tests that are run for one defect, and as many more if none of them fails."""
 MOST_ALIKE = 3
 """Tests of one function with other parameters that are run for one defect, if there are others."""
+MOST_QUICK, QUICK = 100, 0.02
+"""More tests that run first: those of files that name the module and take at most so many seconds.
+
+Of a function with parameters, the few that were chosen may not be those that notice a defect.
+"""
 MOST_SECONDS = 40.0, 40.0
 """Time of these tests, as recorded."""
 TABLES = "tests/test_tables.py::test_constants_and_tables_are_the_recorded_ones"
@@ -300,8 +305,10 @@ class Chooser:
                     part.append(name)
                     seconds -= takes
             left = [name for name in left if name not in part]
-            parts.append(sorted(part, key=lambda name: self._record.tests[name].seconds))
-        return parts
+            parts.append(part)
+        quick = [name for name in near if self._record.tests[name].seconds <= QUICK]
+        parts[0] += [name for name in quick if name not in parts[0]][:MOST_QUICK]
+        return [sorted(part, key=lambda name: self._record.tests[name].seconds) for part in parts]
 
     def _different(self, names: Sequence[str], path: str) -> Iterator[str]:
         """Tests that together reach each line of the module that any of these tests reaches."""

@@ -13,7 +13,7 @@ from tui.cli.running import stop_following
 from tui.cli.running.stop_following import carried_to_rest
 from tui.cli.shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
 from tui.session.command.stop_report import Phase, StopReport
-from tui.session.fleet import Fleet
+from tui.session.fleet import HALF_SENT, Fleet
 
 from .commands import ended
 
@@ -43,6 +43,14 @@ async def test_half_of_a_command_is_followed_to_standstill(
         fleet = Fleet(made.line, made.console.journal, clock=made.clock)
         fleet.take(made.session)
         made.drive.set("STAT", 1)
+        causes: list[str] = []
+        stop = fleet.stop
+
+        def stopped(sessions: Any, *, by: str = "") -> Any:
+            causes.append(by)
+            return stop(sessions, by=by)
+
+        monkeypatch.setattr(fleet, "stop", stopped)
 
         def give() -> None:
             made.commander.run("forward", "20Hz")
@@ -55,6 +63,7 @@ async def test_half_of_a_command_is_followed_to_standstill(
         assert "ended after word 1 of 2" in first
         assert last == text
         assert failed.value.status == status
+        assert HALF_SENT in causes
 
 
 @pytest.mark.parametrize("words", [("reference", "30Hz"), ("reset",)], ids=lambda words: words[0])

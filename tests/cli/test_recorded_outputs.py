@@ -41,7 +41,6 @@ TIMED = {"watch", "scan", "counters", "why"}
 """Commands whose numbers depend on the time that they take: none is recorded."""
 FURTHER: tuple[tuple[str, ...], ...] = (
     ("watch", *DRIVE, "ETA", "RFR", "--every", "0.1", "--count", "2", "--csv", "FOLDER/new.csv"),
-    ("watch", "sim:atv71@1,atv312@2", "-d", "1", "-d", "2", "--every", "0.1", "--count", "1"),
     ("read", *DRIVE, "ETA", "CMI", "RFR", "LFT", "LRS6", "3201", "-d", "9"),
     ("read", "sim:powerdrive", "-p", "powerdrive", "10.40", "5.01"),
     ("read", "sim:atv21", "FD01", "FE03", "FC91"),
@@ -53,12 +52,12 @@ FURTHER: tuple[tuple[str, ...], ...] = (
     ("status", "sim:atv71@1,atv312@2,powerdrive@3", "--all", "--addresses", "1-3"),
     ("status", "sim:atv21"),
     ("identify", "sim:powerdrive", "-d", "1"),
+    ("identify", "sim:powerdrive", "-d", "1", "--hold", "1"),
     ("reset", *DRIVE, "--arm"),
     ("reference", *DRIVE, "700", "--arm"),
     ("reference", "sim:powerdrive", "-p", "powerdrive", "20", "--arm"),
     ("write", *DRIVE, "ACC=4", "DEC=0.5", "HSP=99", "--arm"),
     ("write", *DRIVE, "ACC=4"),
-    ("stop", "sim:atv71@1,atv312@2", "--all"),
     ("stop", "sim:powerdrive", "-d", "1"),
     ("why", "sim:atv71@2", "-d", "2"),
 )

@@ -160,7 +160,7 @@ DEFECTS = (
     Defect(
         "keys-of-a-long-question-out-of-sight",
         "tui/screens/dialogs/question.py",
-        "part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)",
+        "part.styles.max_height = max(least, rows - part.styles.margin.height)",
         "part.styles.max_height = 30",
         "On a small terminal a question hides its last lines or its keys.",
         KEYS,

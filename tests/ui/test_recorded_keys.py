@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import re
 import tempfile
+import time
 from collections.abc import Awaitable, Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -62,9 +63,12 @@ NOT_PRESSED = {
     "goto",
     "hear",
     "why",
-    "disconnect",
 }
-"""Actions that end the panel or its line, open a port, or only show another screen."""
+"""Actions that end the panel, open a port, or only show another screen."""
+WITHOUT_YES = {"(scan_settings)", "(disconnect)"}
+"""Keys whose question is not answered with yes: that would close the line, or scan for long."""
+PATIENCE = 20.0
+"""Seconds for what a key begins."""
 DRAWN = re.compile("[\u2500-\u28ff]")
 """Signs of curves, frames and large digits."""
 FILE = re.compile(r"\S+-\d{8}-\d{4}\.\w+ *")
@@ -249,11 +253,20 @@ def checksum(screen: Screen[Any]) -> str:
 
 async def settled(app: Any, pilot: Pilot[None]) -> None:
     """Draw what is new."""
-    await app.workers.wait_for_complete()
+    end = time.monotonic() + PATIENCE
+    while not all(worker.is_finished for worker in app.workers) and time.monotonic() < end:
+        if isinstance(app.screen, Question):  # a worker waits for its answer
+            break
+        await pilot.pause(0.01)
     if hasattr(app.screen, "look"):
         app.screen.look()
     app.draw_frame()
     await pilot.pause()
+
+
+def is_typing(app: Any) -> bool:
+    """True if the next letter would go into a field or the run line."""
+    return isinstance(app.focused, Input) or "Esc cancel" in picture(app).splitlines()[-1]
 
 
 async def step(app: Any, pilot: Pilot[None], key: str, seen: set[str]) -> list[str]:
@@ -274,7 +287,7 @@ async def step(app: Any, pilot: Pilot[None], key: str, seen: set[str]) -> list[s
 async def pressed(name: str) -> list[str]:
     """All keys of a scene, one after another; a new panel after one that left the screen.
 
-    A question is canceled once, and answered once.
+    A question is canceled once, and answered once; a field is closed after Enter.
     """
     screen, make = SCENES[name]
     keys, found = [*keys_of(screen), *further(screen)], list[str]()
@@ -290,13 +303,15 @@ async def pressed(name: str) -> list[str]:
                 while keys and app.screen is base:
                     key = keys.pop(0)
                     found += await step(app, pilot, key, seen)
-                    if isinstance(app.screen, Question):
+                    if isinstance(app.screen, Question) and key not in WITHOUT_YES:
                         await pilot.press("escape")
                         await fakes.press(pilot, key)
                         yes = "y" if isinstance(app.screen, Confirm) else "enter"
                         found += await step(app, pilot, yes, seen)
+                    elif is_typing(app) and app.screen is base and key != "enter":
+                        found += await step(app, pilot, "enter", seen)
                     for _ in range(3):
-                        if app.screen is not base:
+                        if app.screen is not base or is_typing(app):
                             await pilot.press("escape")
                             await pilot.pause()
                 assert app._exception is None

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 from textual.widgets import Input, OptionList
 
-from tui.screens.command.teaching import PickWord
+from tui.screens.command.teaching import PickWord, _known
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.parameters.screen import ParametersScreen
@@ -162,3 +165,21 @@ async def test_family_with_a_reference_has_no_preset_to_learn() -> None:
         await made.pilot.press("L")
         await made.message("No value here needs a learned scale")
         assert not made.app.screen.query(Input)
+
+
+def test_question_shows_the_present_value_and_what_was_learned() -> None:
+    looks = [SimpleNamespace(text="raw 40 is 4.0 Hz"), SimpleNamespace(text="raw 50 is 5.0 Hz")]
+    raws: dict[str, int] = {}
+    scales: dict[str, Any] = {}
+    console: Any = SimpleNamespace(
+        session=SimpleNamespace(image=SimpleNamespace(raws=raws)),
+        teacher=SimpleNamespace(scales=scales, looks=lambda code: looks if code == "A" else []),
+    )
+    assert _known(console, "B") == "Two readings at different values give the scale."
+    seen = "Earlier readings: raw 40 is 4.0 Hz, raw 50 is 5.0 Hz. Read at another value."
+    assert _known(console, "A") == seen
+    raws["A"] = 7
+    assert _known(console, "A") == f"Present raw value: 7. {seen}"
+    scales["A"] = SimpleNamespace(text="0.1 Hz")
+    learned = "Learned scale: 0.1 Hz. A reading that disagrees discards it."
+    assert _known(console, "A") == f"Present raw value: 7. {learned}"
