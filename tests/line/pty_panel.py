@@ -179,7 +179,7 @@ class PtyPanel:
                 steps = int(control["arguments"] or 1)
                 row_step, column_step = STEPS[control["final"]]
                 self._at = (self._at[0] + row_step * steps, self._at[1] + column_step * steps)
-            elif control["final"] in "XK":
+            elif control["final"] in ("X", "K"):
                 row_at, column_at = self._at
                 rest = COLUMNS - column_at if control["final"] == "K" else 1
                 for erased in range(int(control["arguments"] or rest)):
