@@ -163,5 +163,5 @@ class LineList(OptionList):
 
 
 def list_width(width: int) -> int:
-    """Return the columns of the list in the style sheet, without drives, on so wide a terminal."""
+    """Return the columns of the list before a line is open, on so wide a terminal."""
     return max(22, min(44, width * 44 // 100 - 1))

@@ -9,6 +9,7 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
+from textual.events import Resize
 from textual.widgets import Input
 
 from tui.drive.profile.search import parameter_search
@@ -75,12 +76,15 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     def _room(self) -> int:
         return max(1, self.query_one("#table").size.height)
 
+    def on_resize(self, event: Resize) -> None:
+        """Arrange the parts for the new size, before they are drawn."""
+        self.set_class(event.size.width < NARROW, "narrow")
+        self.set_class(event.size.width >= WIDE, "wide")
+        self.set_class(event.size.height >= TALL_FROM, "tall")
+
     def draw(self, width: int) -> None:
         """Draw the groups, the lines around the cursor, and the details of the selected one."""
         super().draw(width)
-        self.set_class(width < NARROW, "narrow")
-        self.set_class(width >= WIDE, "wide")
-        self.set_class(self.size.height >= TALL_FROM, "tall")
         self.offer_to_follow()
         self.show_results()
         editor, code = self.editor, self.listed.code

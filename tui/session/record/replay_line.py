@@ -321,7 +321,7 @@ class ReplayLine(ReplayedRecord):
 
         async def run() -> None:
             for _ in range(WAKING_TURNS):  # work that was just started begins to sleep
-                await asyncio.sleep(0)
+                await self.clock.sleep(0)
             end = min(at, self.clock.end)
             if not await self.clock.run_to(end, takes):
                 self.clock.skip_to(end)

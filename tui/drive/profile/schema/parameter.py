@@ -234,7 +234,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     min: Annotated[int | None, about("Lowest raw value.")] = None
     max: Annotated[int | None, about("Highest raw value.")] = None
     min_from: Annotated[str, about("Parameter that gives a lower limit.")] = ""
-    max_from: Annotated[str, about("Parameters that limit this one further (LSP..HSP).")] = ""
+    max_from: Annotated[str, about("Parameters that limit this one further.")] = ""
     min_of: Annotated[
         Multiple | None, about("Lowest value as a multiple of another parameter.")
     ] = None
