@@ -316,7 +316,8 @@ async def test_selecting_the_next_word_moves_nothing_else(size: tuple[int, int])
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=size) as pilot:
         screen = await to_monitor(app, pilot, 2)
-        await until(pilot, lambda: "FORWARD" in shown(app, "strip") and shown(app, "curve").strip())
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
+        await until(pilot, lambda: bool(shown(app, "curve").strip()))
         places = {widget.id: widget.region for widget in screen.query(Lines)}
         titles = {shown(app, "curve").split()[0]}
         for _ in range(3):

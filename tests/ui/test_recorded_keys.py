@@ -224,7 +224,7 @@ SCENES: dict[str, tuple[str, Callable[[pytest.MonkeyPatch], Opened]]] = {
 """By scene: the screen whose keys are pressed, or none for those of the panel."""
 ROWS = {"faults": 9, "control": 4, "start-up": 12, "parameters": 5, "scanner": 4, "line": 3}
 """Rows of a screen that are opened one after another, after all keys."""
-QUICK = ("faults", "map", "messages", "scanner proposed")
+QUICK = ("map", "messages")
 """Scenes of the main layer; the others are for the sweeps."""
 
 
