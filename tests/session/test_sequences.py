@@ -188,6 +188,8 @@ async def test_half_of_taking_control_is_stopped_and_half_of_giving_it_back_is_n
         made.commander.order(order)
         assert "Control ended after word 1 of 2" in await made.done(OutcomeKind.REFUSED)
         assert list(dict.fromkeys(commands(made))) == sent
+        if STOP in sent:
+            await made.let_go_until(lambda: bool(fleet.stopper.reports))
         assert bool(fleet.stopper.reports) is (STOP in sent)
 
 

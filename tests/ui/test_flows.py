@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import pytest
 from rich.text import Text
@@ -325,6 +325,28 @@ async def test_selecting_the_next_word_moves_nothing_else(size: tuple[int, int])
             titles.add(shown(app, "curve").split()[0])
             assert {widget.id: widget.region for widget in screen.query(Lines)} == places
         assert len(titles) > 1
+
+
+async def test_curve_follows_the_first_values_in_its_own_output(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A slow link shows the state a second sooner."""
+    drawn: list[tuple[str, str]] = []
+    put = MonitorScreen.put
+
+    def recorded(screen: MonitorScreen, place: str, lines: Sequence[Text]) -> None:
+        drawn.append((place, " ".join(line.plain for line in lines).strip()))
+        put(screen, place, lines)
+
+    monkeypatch.setattr(MonitorScreen, "put", recorded)
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await to_monitor(app, pilot, 2)
+        await until(pilot, lambda: bool(shown(app, "curve").strip()))
+    with_values = next(at for at, drawing in enumerate(drawn) if " Hz" in drawing[1])
+    curves = [text for place, text in drawn[with_values:] if place == "curve"]
+    assert curves[0] == ""
+    assert curves[1] != ""
 
 
 async def test_polling_rate_is_shown() -> None:

@@ -95,6 +95,7 @@ class MonitorScreen(CursorKeys):
         """Urgent parts of the snapshot that was shown last."""
         self._bottom_rows = 0
         self._placed: tuple[Arrangement, int, int] | None = None
+        self._has_drawn_values = False
 
     def body(self) -> ComposeResult:
         """Create the parts; `draw` fills them, and `_place` sizes them."""
@@ -209,6 +210,11 @@ class MonitorScreen(CursorKeys):
         if (run := self.run_line_lines(view.now, width)) is not None:
             parts["message"] = [*[Text("")] * (room.bottom - len(run)), *run]
         parts["keys"] = self._keys_of(view, width)
+        if view.snapshot is not None and not self._has_drawn_values:
+            # the curve follows in its own output: a slow link shows the state a second sooner
+            self._has_drawn_values = True
+            parts["curve"] = [Text("")] * room.curve
+            self.call_after_refresh(self.look)
         self._bottom_rows = len(parts["message"])
         self._place(room)
         for place, lines in parts.items():
