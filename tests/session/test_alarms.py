@@ -164,3 +164,16 @@ def test_onset_of_a_fault_has_its_time_its_code_and_if_the_trip_was_seen() -> No
     assert onsets.by_device[2] == FaultOnset(7.0, True, "ObF")
     onsets.note(2, RUNS, 8.0)
     assert set(onsets.by_device) == {1}
+
+
+def test_older_state_that_is_read_after_one_of_a_record_changes_no_onset() -> None:
+    """After a seek, the checks of a replay begin before its time."""
+    onsets = FaultOnsets()
+    onsets.recall(1, RUNS, 1.0)
+    onsets.recall(1, tripped(OBF), 2.0)
+    onsets.recall(1, tripped(OBF), 9.0)
+    onsets.note(1, RUNS, 5.0)
+    onsets.note(1, tripped(OBF), 6.0)
+    assert onsets.by_device == {1: FaultOnset(2.0, True, "ObF")}
+    onsets.note(1, RUNS, 10.0)
+    assert onsets.by_device == {}

@@ -144,7 +144,7 @@ class Framed(Screen[Any]):
             return
         is_centered = self.styles.align_vertical == "middle"
         for part in self.children:
-            if part.id not in self._frame_parts:
+            if part is not self._small and part.id not in self._frame_parts:
                 part.styles.max_height = self.dialog_rows
                 if is_centered:
                     part.styles.margin = (0, 0, max(0, self._rows_below() + 1 - TOP_ROWS), 0)

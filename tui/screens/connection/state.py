@@ -55,7 +55,7 @@ KEPT_FROM_REACTING = (
 )
 """Events shown once per drive, with its address and communication timeout in s."""
 OPEN_CLASS = "-open"
-"""Class of the screen while a line is open or being opened; else the list of lines is wider."""
+"""Class of the screen while a line is open; else the list of lines is wider."""
 WIDE_CLASS = "-wide"
 """Class of the screen while the drives have the whole width."""
 NOBODY: Mapping[int, WallRow] = MappingProxyType({})
@@ -243,7 +243,7 @@ class LineView(PanelScreen):
         """Give the drives the whole width while the cursor is not on the lines or the form."""
         left = self.query_one("#left")
         focused = self.focused
-        self.set_class(self.app.opening.goes_on or self.app.fleet is not None, OPEN_CLASS)
+        self.set_class(self.app.fleet is not None, OPEN_CLASS)
         wide = bool(self.found) and (focused is None or left not in focused.ancestors)
         if wide is not self.has_class(WIDE_CLASS):
             self.set_class(wide, WIDE_CLASS)

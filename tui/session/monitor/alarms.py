@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -27,10 +28,17 @@ class FaultOnsets:
         self._free: frozenset[int] = frozenset()
         """Drives without a fault at their last read."""
         self.by_device: Mapping[int, FaultOnset] = {}
+        self._recalled: dict[int, float] = {}
+        """Time of the newest state from a record, by device."""
+
+    def recall(self, device: int, state: DriveState, wall: float) -> None:
+        """Note a state of a record; one before it that is read later changes nothing."""
+        self.note(device, state, wall)
+        self._recalled[device] = wall
 
     def note(self, device: int, state: DriveState, wall: float) -> None:
         """Note a state that was just read; an unknown state changes nothing."""
-        if state.kind == "unknown":
+        if state.kind == "unknown" or wall < self._recalled.get(device, -math.inf):
             return
         onset = self.by_device.get(device)
         if state.kind != "fault":

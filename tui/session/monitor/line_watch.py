@@ -262,7 +262,7 @@ class LineWatch:
     def recall(self, device: int, look: Look) -> None:
         """Take a check of a record, as the last one of a drive."""
         if look.state is not None:
-            self.onsets.note(device, look.state, look.time)
+            self.onsets.recall(device, look.state, look.time)
         self._looks = {**self._looks, device: look}
 
     def stop(self) -> None:
