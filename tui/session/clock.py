@@ -57,7 +57,7 @@ class Clock:
 REAL_CLOCK = Clock()
 
 SLOW_CHARACTERS = 1200
-"""Characters that others may say meanwhile: at 1200 baud 11 s, at 19200 0.7 s."""
+"""Characters that other programs may send meanwhile: at 1200 baud 11 s, at 19200 0.7 s."""
 
 
 def patience(line: ModbusLine, seconds: float) -> float:

@@ -53,6 +53,8 @@ UNPROVED_WRITE = (
     " written from public documents. Confirm the profile first."
 )
 
+log = logging.getLogger(__name__)
+
 
 class DriveSession:
     """A drive with its profile; the only owner of its registers, its work and its arming.
@@ -356,9 +358,6 @@ def why_unproved(session: DriveSession, parameter: Parameter, raw: int) -> str:
     if not session.is_unconfirmed or is_proved_write(session.profile, parameter, raw):
         return ""
     return UNPROVED_WRITE.format(code=parameter.code, name=session.profile.name)
-
-
-log = logging.getLogger(__name__)
 
 
 def prepared_stop(
