@@ -40,7 +40,6 @@ _END_OF_TIME = 4e9
 """A time after all records, in seconds since 1970."""
 _EXACT = 1.0
 """Seconds up to which the times of a run or a trip count as exact."""
-_INEXACT = ", time to "
 
 
 class LineRun(NamedTuple):
@@ -220,12 +219,10 @@ def _trip_entries(line: str, trip: RecordedTrip, noted: Sequence[Entry]) -> Iter
             for entry in noted
         ):
             continue
-        why = RECORD_SHOWS_IT
-        if within is not None and within > _EXACT:
-            why = f"{why}{_INEXACT}{within:.0f} s"
         yield Entry(
             entry_time(wall), line, trip.device, trip.profile, trip.code, 0, None, "",
-            trip.raw or 0, trip.name, answer, None, why, kind="fault",
+            trip.raw or 0, trip.name, answer, None, RECORD_SHOWS_IT, kind="fault",
+            within=round(within or 0.0, 3),
         )  # fmt: skip
 
 
@@ -272,8 +269,7 @@ def entry_text(entry: Entry) -> str:
     """Return an entry without its time and drive: old and new value, answer, reason."""
     match entry.kind:
         case "fault":
-            _, inexact, seconds = entry.why.partition(_INEXACT)
-            note = f"  (time to {seconds})" if inexact else ""
+            note = f"  (time to {entry.within:.0f} s)" if entry.within > _EXACT else ""
             return f"{f'FAULT {entry.code} {entry.new}'.rstrip()}: {entry.answer}{note}"
         case "proof":
             return f"{entry.why}: {entry.new}  {entry.answer}"

@@ -78,6 +78,8 @@ class Entry:
     """Identity that the drive reported, if the write is counted."""
     eeprom: Literal["", "write", "save"] = ""
     """`write` if the drive may have stored the value in its EEPROM, `save` if all settings."""
+    within: float = 0.0
+    """Seconds by which the time of a `fault` entry may differ; 0 if it was noted at once."""
 
 
 FAULT_WHYS = {

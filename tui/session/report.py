@@ -326,7 +326,7 @@ def trips_of(entries: Iterable[Entry]) -> list[Trip]:
                 found[-1] = replace(last, code=entry.code, name=entry.new, reset=entry.time)
             continue
         # older files say "tripped" of each fault that was there when a panel was opened
-        known = entry.why.startswith((FAULT_WHYS["tripped"], RECORD_SHOWS_IT))
+        known = entry.why in (FAULT_WHYS["tripped"], RECORD_SHOWS_IT)
         tripped = entry.answer == "tripped" and known
         if last is not None and ongoing and not tripped:
             found[-1] = replace(last, code=entry.code, name=entry.new)

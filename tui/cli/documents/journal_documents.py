@@ -32,6 +32,10 @@ class JournalEntryField(DocumentPart):
         Literal["", "write", "save"],
         Meta(description="`write` if the value may go to EEPROM, `save` if all settings do."),
     ]
+    within: Annotated[
+        float,
+        Meta(description="Seconds by which the time may differ; 0 if it was noted at once."),
+    ]
 
 
 class DamagedLineField(DocumentPart):
