@@ -8,6 +8,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from msgspec import structs
 
 from tests.blocks import block_of
 from tests.session.sets_bench import Bench, bench, state_known
@@ -17,10 +18,17 @@ from tui.drive.blocks.assignment import Assignment, MappingError, empty
 from tui.drive.blocks.picking import pick
 from tui.drive.blocks.wire_cost import block_request, reach
 from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.profile.profile import Profile
 from tui.session.blocks import exchange as module
 from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.exchange import Exchanged
-from tui.session.blocks.outputs import ConfirmedWrite, intended, refuse_pending
+from tui.session.blocks.outputs import (
+    ConfirmedWrite,
+    example,
+    intended,
+    refuse_pending,
+    values_text,
+)
 from tui.session.blocks.write import AssignmentRefused
 from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
@@ -433,7 +441,7 @@ async def test_partly_written_slots_still_wait_for_a_reset() -> None:
 def intended_of(
     here: Bench, outputs: Assignment, text: str, inputs: Assignment | None = None
 ) -> ConfirmedWrite:
-    return intended(here.profile, 1, outputs, inputs, {"INR": 1, "LFRD": 900}, text)
+    return intended(here.profile, 1, outputs, inputs, {"INR": 1, "LFRD": 900}, (), text)
 
 
 def test_values_and_frame_are_shown_before_sending() -> None:
@@ -453,10 +461,31 @@ def test_values_and_frame_are_shown_before_sending() -> None:
 def test_value_with_an_unknown_scale_is_shown_raw() -> None:
     with bench("atv71") as here:
         outputs = plan_of(here, "write", EXAMPLE_OUT)
-        reported = intended(here.profile, 1, outputs, None, {"LFRD": 900}, "acc=16#0032")
+        reported = intended(here.profile, 1, outputs, None, {"LFRD": 900}, (), "acc=16#0032")
         assert "ACC 50 raw" in reported.follows
-        reported = intended(here.profile, 1, outputs, None, {"LFRD": 900, "INR": 1}, "acc=16#0032")
+        known = {"LFRD": 900, "INR": 1}
+        reported = intended(here.profile, 1, outputs, None, known, (), "acc=16#0032")
         assert "ACC 5.0 s" in reported.follows
+
+
+def test_scale_without_its_parameter_is_the_one_that_the_profile_gives() -> None:
+    with bench("atv71") as here:
+        outputs = plan_of(here, "write", EXAMPLE_OUT)
+        data = here.profile.data
+        assert here.profile["ACC"].scale_by is not None
+        fixed = structs.replace(here.profile["ACC"].scale_by, absent="0.1")
+        parameters = [
+            structs.replace(each, scale_by=fixed) if each.code == "ACC" else each
+            for each in data.parameters
+        ]
+        profile = Profile(structs.replace(data, parameters=parameters))
+        with pytest.raises(ValueRefused, match="INR"):
+            intended(profile, 1, outputs, None, {"LFRD": 900}, (), "acc=5")
+        reported = intended(profile, 1, outputs, None, {"LFRD": 900}, {"INR"}, "acc=5")
+        assert reported.wanted == {"ACC": 50}
+        assert "ACC 5.0 s" in reported.follows
+        assert example(profile, outputs, {"CMD": 0, "LFRD": 900}, {"INR"}) == "CMD=16#0000 LFRD=900"
+        assert values_text(profile, {"ACC": 50}, {}, {"INR"}) == "ACC 5.0 s"
 
 
 @pytest.mark.parametrize(

@@ -238,7 +238,8 @@ class BlockEditor:
 
     def example(self) -> str:
         """Return an example of a text that writes through the outputs. Raises MappingError."""
-        return example(self.session.profile, self._outputs(), self.session.image.raws)
+        image = self.session.image
+        return example(self.session.profile, self._outputs(), image.raws, image.lacking)
 
     def intended(self, text: str) -> ConfirmedWrite:
         """Parse `LFRD=1500 ACC=5.0` for the present outputs, with the consequences.
@@ -249,8 +250,8 @@ class BlockEditor:
         refuse_pending(outputs, self.mapper.written)
         read = next((b for b in self.proposals.blocks if b.direction == "read"), None)
         inputs = self.proposals.today(read) if read else None
-        raws = session.image.raws
-        return intended(session.profile, session.device, outputs, inputs, raws, text)
+        known = session.image.raws, session.image.lacking
+        return intended(session.profile, session.device, outputs, inputs, *known, text)
 
     def exchange(self, agreed: ConfirmedWrite, stamp: int | None = None) -> None:
         """Write confirmed values through the outputs; returns immediately."""
@@ -266,9 +267,9 @@ class BlockEditor:
                 permit=permit,
                 in_force=True,
             )
-            raws = session.image.raws
-            sent = values_text(session.profile, agreed.wanted, raws)
-            back = values_text(session.profile, done.inputs, raws)
+            known = session.image.raws, session.image.lacking
+            sent = values_text(session.profile, agreed.wanted, *known)
+            back = values_text(session.profile, done.inputs, *known)
             return f"Wrote {sent}. The reply has {back}." if back else f"Wrote {sent}."
 
         self._run(work, "Writing through the outputs", stamp)

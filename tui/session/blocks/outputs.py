@@ -40,7 +40,7 @@ def example(
     profile: Profile,
     outputs: Assignment,
     raws: Mapping[str, int],
-    absent: Collection[str] = (),
+    absent: Collection[str],
 ) -> str:
     """Return an example text with the current values of the first two of these outputs."""
     first = list(output_codes(profile, outputs).values())[:2]
@@ -55,8 +55,8 @@ def intended(
     outputs: Assignment,
     inputs: Assignment | None,
     raws: Mapping[str, int],
+    absent: Collection[str],
     text: str,
-    absent: Collection[str] = (),
 ) -> ConfirmedWrite:
     """Parse a text like `LFRD=1500 ACC=5.0`.
 
@@ -95,10 +95,15 @@ def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:
         raise MappingError(f"Not in effect yet: {', '.join(found)}. Reset the drive first.")
 
 
-def values_text(profile: Profile, values: Mapping[str, int], raws: Mapping[str, int]) -> str:
+def values_text(
+    profile: Profile,
+    values: Mapping[str, int],
+    raws: Mapping[str, int],
+    absent: Collection[str],
+) -> str:
     """Return codes with their values in one line."""
     return ", ".join(
-        f"{c} {shown_text(profile, profile[c], raw, raws)}" for c, raw in values.items()
+        f"{c} {shown_text(profile, profile[c], raw, raws, absent)}" for c, raw in values.items()
     )
 
 
