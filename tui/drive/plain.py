@@ -30,6 +30,16 @@ def plain_cells(cells: Iterable[object]) -> list[str]:
     return ["" if cell is None else plain(str(cell)) for cell in cells]
 
 
+def csv_text(rows: Iterable[Iterable[object]], end: str = "\r\n") -> str:
+    """Return rows of sanitized cells as CSV, each with its line end."""
+    import csv  # imported late: speeds up the start
+    import io
+
+    text = io.StringIO(newline="")
+    csv.writer(text, lineterminator=end).writerows(map(plain_cells, rows))
+    return text.getvalue()
+
+
 def markdown_cell(text: str) -> str:
     """Return a text that ends neither the column nor the row of a Markdown table."""
     return plain(text.replace("\n", " ")).replace("|", "\\|")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import csv
-import io
 import os
 import re
 import sys
@@ -15,7 +14,7 @@ from typing import TextIO
 
 import click
 
-from tui.drive.plain import plain_cells
+from tui.drive.plain import csv_text, plain_cells
 
 from .errors import USAGE, Failure, file_failures
 from .standard_streams import STANDARD
@@ -86,7 +85,7 @@ class CsvFile:
         else:
             file = self.path.open("w", newline="", encoding="utf-8")
         try:
-            csv.writer(file).writerow(plain_cells(self._titles))
+            file.write(csv_text([self._titles]))
             file.flush()
         except OSError:
             with suppress(OSError):
@@ -105,9 +104,7 @@ class CsvFile:
 
     def write(self, cells: Sequence[str]) -> None:
         """Write a row; raises Failure where the disk does not take it."""
-        text = io.StringIO(newline="")
-        csv.writer(text).writerow(plain_cells(cells))
-        row = text.getvalue()
+        row = csv_text([cells])
         with file_failures(self.path):
             if self._due(len(row.encode())):
                 self._put_aside()

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Literal
 
-from ..plain import markdown_table, plain_cells
+from ..plain import csv_text, markdown_table
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import shown
@@ -194,12 +192,11 @@ def _markdown(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
 
 
 def _csv(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    head = ["code", "name", "group", *labels, "raw a", "raw b", "differs", "remark"]
-    writer.writerow(plain_cells(head))
+    table: list[tuple[object, ...]] = [
+        ("code", "name", "group", *labels, "raw a", "raw b", "differs", "remark")
+    ]
     for row in rows:
+        values = row.a, row.b, row.a_raw, row.b_raw
         differs = "yes" if row.differs else "no"
-        reported = (row.code, row.name, row.group, row.a, row.b, row.a_raw, row.b_raw)
-        writer.writerow(plain_cells((*reported, differs, row.note)))
-    return text.getvalue()
+        table.append((row.code, row.name, row.group, *values, differs, row.note))
+    return csv_text(table, end="\n")

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
 from xml.sax.saxutils import escape
 
-from tui.drive.plain import plain_cells
+from tui.drive.plain import csv_text
 from tui.session.record.decoding import HistoryPoint
 from tui.session.record.history import History
 
@@ -39,7 +37,7 @@ def save_trend(
         raise FileExistsError(17, "The drawing exists already", str(drawing))
     path.parent.mkdir(parents=True, exist_ok=True)
     with path.with_suffix(".csv").open("x", encoding="utf-8", newline="") as file:
-        file.write(csv_text(traces, merged))
+        file.write(trend_csv(traces, merged))
     with drawing.open("x", encoding="utf-8") as file:
         file.write(svg_text(traces, merged, since, until))
     return sum(point.mean is not None for points in merged for point in points)
@@ -55,11 +53,9 @@ def points_of_time(
     return points + [point for point in live if since <= point.time <= until]
 
 
-def csv_text(traces: Sequence[BandTrace], points: Sequence[Sequence[HistoryPoint]]) -> str:
+def trend_csv(traces: Sequence[BandTrace], points: Sequence[Sequence[HistoryPoint]]) -> str:
     """Return the rows of all bands, by time; a row without a value has its reason as quality."""
-    text = io.StringIO()
-    table = csv.writer(text)
-    table.writerow(plain_cells(COLUMNS_OF_CSV))
+    table: list[Sequence[object]] = [COLUMNS_OF_CSV]
     rows = [
         (point.time, trace, point)
         for trace, found in zip(traces, points, strict=True)
@@ -72,8 +68,8 @@ def csv_text(traces: Sequence[BandTrace], points: Sequence[Sequence[HistoryPoint
         local = utc.astimezone().isoformat(timespec="milliseconds")
         first = utc.isoformat(timespec="milliseconds").replace("+00:00", "Z"), local
         last = point.quality, least, most, point.good, int(point.reduced)
-        table.writerow(plain_cells((*first, *trace.band, mean, trace.unit, *last)))
-    return text.getvalue()
+        table.append((*first, *trace.band, mean, trace.unit, *last))
+    return csv_text(table)
 
 
 def svg_text(
