@@ -40,7 +40,7 @@ NOT_RUN = {"ports", "bundle", "listen"}
 TIMED = {"watch", "scan", "counters", "why"}
 """Commands whose numbers depend on the time that they take: none is recorded."""
 BUSY = r"(, up to N ms: N)+|, N ms after each request"
-"""What they say only on a busy computer."""
+"""Texts of a busy computer."""
 FURTHER: tuple[tuple[str, ...], ...] = (
     ("watch", *DRIVE, "ETA", "RFR", "--every", "0.1", "--count", "2", "--csv", "FOLDER/new.csv"),
     ("read", *DRIVE, "ETA", "CMI", "RFR", "LFT", "LRS6", "3201", "-d", "9"),
