@@ -71,7 +71,8 @@ def short(found: object) -> str:
 RECORDED = (
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
     "session.test_recorded_texts", "session.test_recorded_records",
-    "session.test_recorded_recorders", "ui.test_recorded_drawings", "ui.test_recorded_keys",
+    "session.test_recorded_recorders", "session.test_recorded_steps",
+    "ui.test_recorded_drawings", "ui.test_recorded_keys",
     "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
 )  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""

@@ -30,7 +30,7 @@ from tui.session.record import record_file, recorder, ring
 from tui.session.record.record_file import RecordFile
 from tui.session.record.recorder import LineRecorder
 from tui.session.record.ring import make_room, record_path
-from tui.session.record.schema import EventRow, RecordDamaged, RecordHeld
+from tui.session.record.schema import EventRow, RecordDamaged, RecordHeld, ReplyRow
 
 TEXTS = Path(__file__).parent / "recorded_recorders.txt"
 DAY = 20_000
@@ -292,14 +292,14 @@ def oldest_first() -> Iterator[str]:
                 paths[1].with_name(paths[1].name + "-wal").write_bytes(bytes(wal))
                 paths[2].with_name(paths[2].name + "-journal").write_bytes(bytes(20))
                 Path(steps.folder, "other.txt").write_bytes(bytes(5000))
-                excess, path = make_room(steps.folder, paths[:own], most)
+                excess, closed = make_room(steps.folder, paths[:own], most)
                 left = sorted(each.name[8:] for each in steps.folder.iterdir())
-                yield f"{most} {own} {age} {wal}: {excess} {path and path.name} {left}"
+                yield f"{most} {own} {age} {wal}: {excess} {closed and closed.name} {left}"
 
 
-def record_row(steps: Steps, number: int, at: int) -> Any:
+def record_row(steps: Steps, number: int, at: int) -> ReplyRow:
     words = bytes([number, at] * 100)
-    return record_file.ReplyRow(
+    return ReplyRow(
         round((steps.now + steps.offset) * 1e6) + at, round(steps.now * 1e6) + at, 9, 4, 3, 100,
         100, 0, words, None, None, 0, "",
     )  # fmt: skip

@@ -25,6 +25,7 @@ from tui.bus.model import EndedExchange
 from tui.bus.poll_plan import PlannedRead
 from tui.drive.profile.library import load, load_file
 from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
 from tui.drive.taught_profile import with_taught
 from tui.drive.teaching import TaughtScale
 from tui.drive.values import word_count
@@ -159,7 +160,7 @@ def families() -> Iterator[str]:
     for name in ("whole", "coils", "pump", "atv31"):
         path = ROOT / "tests" / "drive" / f"{name}.toml"
         known = load_file(path) if path.exists() else load(name)
-        kinds = {}
+        kinds: dict[tuple[object, ...], Parameter] = {}
         for entry in known.data.parameters:
             kind = entry.function, entry.type, bool(entry.bits), bool(entry.values), entry.mask
             kinds.setdefault((*kind, bool(entry.scale_by), entry.low_word_first), entry)
@@ -199,19 +200,20 @@ def pasts() -> Iterator[str]:
             yield f"  {[text.replace(str(files[0].parent), '') for text in record.unread]}"
             yield f"  {[event.text for event in record.of('line')]} {list(record.of('stop', 2))}"
             yield from (past_text(loss) for loss in lost_lines(record))
-            span = ((-10, 1000), (45, 125), (600, 700))
+            span = ((-10.0, 1000.0), (45.0, 125.0), (600.0, 700.0))
             for device, name, (since, until) in product((1, 2), ("atv71", "atv312", "x"), span):
                 found = history_of(record, device, name, BEGIN + since, BEGIN + until)
                 yield f"drive {device}, {name}, from {since} to {until}"
                 yield from (past_text(each) for part in found for each in part)
             each = ((1,), (9, 2), (9,))
             yield f"{[oldest_reply([damaged, *files], devices) for devices in each]}"
-            for since, until in ((0, 41), (60, 100.5), (100.5, 900)):
+            for since, until in ((0.0, 41.0), (60.0, 100.5), (100.5, 900.0)):
                 found_events = recorded_events(files, BEGIN + since, BEGIN + until)
                 yield f"{[f'{seconds(each.utc / 1e6)} {each.kind}' for each in found_events]}"
             names = ("RFR", "LCR", "ETA")
-            span = BEGIN + 80, BEGIN + 420
-            several = {code: read_history(files, 1, code, *span) for code in names}
+            several = {
+                code: read_history(files, 1, code, BEGIN + 80, BEGIN + 420) for code in names
+            }
             for row in list(export_rows(1, several))[::5]:
                 values = {code: point.mean for code, point in row.points.items()}
                 yield f"  {seconds(row.time)} {row.device} {values} {seconds(row.gap_until)}"
@@ -219,10 +221,9 @@ def pasts() -> Iterator[str]:
 
 def past_text(found: RecordedRun | RecordedTrip | LostLink) -> str:
     """A run, a trip or a loss, with its times since the begin."""
-    times = {name: seconds(getattr(found, name)) for name in ("begun", "ended")}
-    rounded = (round(part, 3) if isinstance(part, float) else part
-               for part in found._replace(**times))  # fmt: skip
-    return f"  {type(found).__name__} {list(rounded)}"
+    parts = {**found._asdict(), "begun": seconds(found.begun), "ended": seconds(found.ended)}
+    rounded = [round(part, 3) if isinstance(part, float) else part for part in parts.values()]
+    return f"  {type(found).__name__} {rounded}"
 
 
 PLACES = ((3, 3201, 4), (3, 3203, 1), (3, 3204, 2), (3, LFT, 1), (3, ACC, 1), (3, 9999, 1),
@@ -286,7 +287,8 @@ def known_texts(line: ReplayLine) -> Iterator[str]:
     yield f"  {[(each.words, seconds(each.time)) if each else None for each in last]}"
     for device in (1, 2):
         state = line.device_state(device)
-        yield f"  {replace(state, heard=seconds(state.heard), silent_since=seconds(state.silent_since))}"
+        heard, silent = seconds(state.heard), seconds(state.silent_since)
+        yield f"  {replace(state, heard=heard, silent_since=silent)}"
         note = line.profile_note(device)
         places = dict(line.in_block(device, round(line.clock.wall() * 1e6)))
         yield f"  {note and seconds(note.utc / 1e6)} {places}"
