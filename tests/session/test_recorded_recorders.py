@@ -1,7 +1,7 @@
-"""What a recorder does with its files, turn by turn, as text.
+"""Turns of a recorder as text: the calls of its files, its reports, and the rows that are left.
 
-`recorded_recorders.txt` has a section for each subject: each call of a file, what is reported, and
-the rows that are left. The time is the test's, and the recorder's thread waits for it.
+The time is the test's, and the recorder's thread waits for it. `recorded_recorders.txt` has a
+section for each subject.
 """
 
 from __future__ import annotations

@@ -235,7 +235,7 @@ REPORT = reply(2.2, function=17, address=0, sent=b"\x11", received=b"\x11\3\1ab"
 
 
 def replays() -> Iterator[str]:
-    """What is known at each of some times, after a way there and at once."""
+    """Known values at some times, by one replay that moves there, and by one that begins then."""
     rows = [*drive_rows(), IDENTITY, REPORT, *(reply(at, (7,), device=2) for at in (3, 199.5))]
     rows += [
         stray_row(EndedExchange(1, b"", "reply", b"", 0, BEGIN, BEGIN + 5, strays=()), b"\1\2")
