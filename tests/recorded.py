@@ -74,6 +74,7 @@ RECORDED = (
     "session.test_recorded_recorders", "session.test_recorded_steps",
     "ui.test_recorded_drawings", "ui.test_recorded_keys",
     "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
+    "cli.test_recorded_values", "cli.test_recorded_states",
 )  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 

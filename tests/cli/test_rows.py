@@ -41,6 +41,17 @@ def test_row_with_a_title_is_printed(capsys: pytest.CaptureFixture[str]) -> None
     assert capsys.readouterr().out == "State   ready\n"
 
 
+@pytest.mark.parametrize("cells", [("a",), ("a", "b", "c")])
+def test_row_without_a_cell_for_each_column_is_an_error(cells: tuple[str, ...]) -> None:
+    columns = (Column(), Column())
+    with pytest.raises(ValueError, match="zip"):
+        row_text(columns, cells)
+    with pytest.raises(ValueError, match="zip"):
+        table_of(columns, [("a", "b"), cells])
+    with pytest.raises(ValueError, match="zip"):
+        table_of(columns[1:], [("a", "b")], width=20)
+
+
 OPTIONAL = (
     Column("Code"),
     Column("Name", readable=8),
