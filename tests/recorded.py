@@ -72,6 +72,7 @@ RECORDED = (
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
     "session.test_recorded_texts", "session.test_recorded_records",
     "session.test_recorded_recorders", "session.test_recorded_steps",
+    "session.test_recorded_traffic",
     "ui.test_recorded_drawings", "ui.test_recorded_keys",
     "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
     "cli.test_recorded_values", "cli.test_recorded_states",

@@ -112,6 +112,9 @@ def _drive_lines(drive: DriveSummary) -> Iterator[str]:
         yield "Broadcast to all devices"
     else:
         yield f"Device {tally.device}: {family_text(drive.family)}"
+    if not tally.requests:
+        yield f"  {counted(tally.answers['unasked'], *texts.UNASKED_TEXTS)}"
+        return
     if drive.silent and tally.device:
         single, several = "  no answer to 1 request", "  no answer to {count} requests"
         yield counted(tally.requests, single, several)

@@ -21,6 +21,7 @@ DAMAGED_TEXTS = (
     "damaged answer once: noise, or several devices with the address {device}",
     "damaged answer {count} times: noise, or several devices with the address {device}",
 )
+UNASKED_TEXTS = ("1 answer without a request", "{count} answers without a request")
 TWO_ANSWERS_TEXTS = (
     "TWO ANSWERS to 1 request: do two devices have the address {device}?",
     "TWO ANSWERS to {count} requests: do two devices have the address {device}?",
