@@ -73,6 +73,7 @@ RECORDED = (
     "session.test_recorded_texts", "session.test_recorded_records",
     "session.test_recorded_recorders", "session.test_recorded_steps",
     "session.test_recorded_traffic",
+    "session.test_recorded_monitoring",
     "ui.test_recorded_drawings", "ui.test_recorded_keys",
     "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
     "cli.test_recorded_values", "cli.test_recorded_states",

@@ -110,5 +110,8 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/share/polls.py:PollsServed._read: constant: 0.0 -> 1.0": (
         "It is long ago in any case: a plan that was never read may reuse any reply of its age."
     ),
+    "tui/session/monitor/trend.py:Trend.join: constant: 0.0 -> 1.0": (
+        "It is the last time of no points, which none is compared with."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

@@ -1,4 +1,4 @@
-"""What is heard on lines with other masters, in whole, as recorded text.
+"""Traffic on lines with other masters, decoded and summarized, as recorded text.
 
 `recorded_traffic.txt` has a section for each subject. A scene has its frames, the texts of its
 exchanges, all counts of the line and of each drive, and the summary that a person reads.
@@ -6,7 +6,7 @@ exchanges, all counts of the line and of each drive, and the summary that a pers
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from itertools import combinations_with_replacement, product
 from pathlib import Path
@@ -54,7 +54,7 @@ TEXTS = Path(__file__).parent / "recorded_traffic.txt"
 TIMING = WireTiming(CHARACTER, SILENCE, 0.005)
 
 
-def said(text: str, device: int = 2) -> bytes:
+def hexed(text: str, device: int = 2) -> bytes:
     """A frame by the hexadecimal digits of its function and data."""
     return frame(device, bytes.fromhex(text))
 
@@ -68,7 +68,7 @@ ATV = library.load("atv71")
 TTO = ATV["TTO"].address
 Pause = float
 """Seconds without a byte, in a scene."""
-SCENES: dict[str, tuple[Families, list[bytes | Pause]]] = {
+SCENES: dict[str, tuple[Families, Sequence[bytes | Pause]]] = {
     "nothing": (named(), [5.0]),
     "one request": (named(), [READ, 0.4]),
     "slow polls": (
@@ -76,31 +76,31 @@ SCENES: dict[str, tuple[Families, list[bytes | Pause]]] = {
     ),
     "reads, writes": (
         named("atv31", "atv71"),
-        [READ, WORDS, COMMAND, COMMAND, write_frame(2, 8501, [6, 425]), said("1021350002"), BOTH,
+        [READ, WORDS, COMMAND, COMMAND, write_frame(2, 8501, [6, 425]), hexed("1021350002"), BOTH,
          BOTH_REPLY, write_one(2, 9001, 30), write_one(2, 9001, 30), write_one(2, 7, 30),
          write_one(2, 7, 31), 0.1, COMMAND, COMMAND],
     ),
     "coils and others": (
         named(),
-        [said("0100050003"), said("010105"), said("0200050003"), said("020102"),
-         said("0400050002"), said("04040001ffff"), said("050007ff00"), said("050007ff00"),
-         said("0500070000"), said("0500070000"), said("0f0003000a02cd01"), said("0f0003000a"),
-         said("0f0003000a01cd"), 4.0, said("07"), said("0712"), said("0800001234"),
-         said("0800001234"), said("11"), said("110201ff"), said("160004f2000025"),
-         said("160004f2000025"), UNKNOWN, 0.1, UNKNOWN, 4.0],
+        [hexed("0100050003"), hexed("010105"), hexed("0200050003"), hexed("020102"),
+         hexed("0400050002"), hexed("04040001ffff"), hexed("050007ff00"), hexed("050007ff00"),
+         hexed("0500070000"), hexed("0500070000"), hexed("0f0003000a02cd01"), hexed("0f0003000a"),
+         hexed("0f0003000a01cd"), 4.0, hexed("07"), hexed("0712"), hexed("0800001234"),
+         hexed("0800001234"), hexed("11"), hexed("110201ff"), hexed("160004f2000025"),
+         hexed("160004f2000025"), UNKNOWN, 0.1, UNKNOWN, 4.0],
     ),
     "identity": (
         named(),
         [IDENTIFY, IDENTITY, *own(3201, 7), IDENTIFY,
-         said("2b0e0101000003000153010541545637310203313033"), said("2b0e0101"), IDENTIFY,
-         said("2b0e010100000200015300014e"), IDENTIFY, said("ab01"), IDENTIFY, 4.0],
+         hexed("2b0e0101000003000153010541545637310203313033"), hexed("2b0e0101"), IDENTIFY,
+         hexed("2b0e010100000200015300014e"), IDENTIFY, hexed("ab01"), IDENTIFY, 4.0],
     ),
     "no answers": (
         named("atv71", "atv71"),
         [READ, WORDS, READ, 3.5, READ, 3.5, READ, b"\x07\x07", 3.5, READ, REFUSED, READ, REFUSED,
-         READ, said("8304"), READ, said("8363"), READ, WORDS, WORDS, READ, WORDS, WORDS,
-         said("0302ffff", 9), read_frame(8, 60, 2), 3.5, read_frame(8, 60, 2), 3.5,
-         read_frame(7, 60, 2), said("8302", 7), read_frame(6, 60, 1), b"\x09\x09\x09", 3.5],
+         READ, hexed("8304"), READ, hexed("8363"), READ, WORDS, WORDS, READ, WORDS, WORDS,
+         hexed("0302ffff", 9), read_frame(8, 60, 2), 3.5, read_frame(8, 60, 2), 3.5,
+         read_frame(7, 60, 2), hexed("8302", 7), read_frame(6, 60, 1), b"\x09\x09\x09", 3.5],
     ),
     "broadcasts": (
         named("atv71", "atv71"),
@@ -128,10 +128,10 @@ SCENES: dict[str, tuple[Families, list[bytes | Pause]]] = {
     ),
     "guesses": (
         named(),
-        [*own(3201, 1, 2), *own(5, 1, 2, 3, 4, device=3), read_frame(3, 64001, 1), said("8302", 3),
-         read_frame(3, 3201, 1), said("8302", 3), *own(0xFD00, 1, device=4),
-         read_frame(4, 0xFD01, 1), said("8301", 4), *own(3201, *range(40), device=5),
-         said("0404bb0001", 6), said("04020001", 6)],
+        [*own(3201, 1, 2), *own(5, 1, 2, 3, 4, device=3), read_frame(3, 64001, 1), hexed("8302", 3),
+         read_frame(3, 3201, 1), hexed("8302", 3), *own(0xFD00, 1, device=4),
+         read_frame(4, 0xFD01, 1), hexed("8301", 4), *own(3201, *range(40), device=5),
+         hexed("0404bb0001", 6), hexed("04020001", 6)],
     ),
     "whole": (
         Families(PROFILES, {None: whole()}, {2: "atv31"}),
@@ -153,7 +153,7 @@ def traffic() -> Iterator[str]:
             yield from scene(families, steps, character)
 
 
-def scene(families: Families, steps: list[bytes | Pause], character: float) -> Iterator[str]:
+def scene(families: Families, steps: Sequence[bytes | Pause], character: float) -> Iterator[str]:
     frames: list[str] = []
 
     def heard(found: ObservedFrame, request: bool | None) -> None:
@@ -250,7 +250,7 @@ def guesses() -> Iterator[str]:
 
 
 def timeouts() -> Iterator[str]:
-    """How a drive is fed, by its rules, what was read, and the pauses."""
+    """The margin of a timeout, by its rules, the values that were read, and the pauses."""
     profile = whole()
     assert profile.data.communication_fault is not None
     rules = profile.data.communication_fault
