@@ -264,6 +264,7 @@ def test_keeper_has_its_line_shared_gated_and_under_its_lock(
 
     heard: list[object] = []
     monkeypatch.setattr(process, "Line", line)
+    monkeypatch.setattr(process, "record_line", lambda *these: ("recorder", *these))
     monkeypatch.setattr(process, "Journal", lambda: "journal")
     monkeypatch.setattr(process, "OrphanMotorGuard", lambda *these: made.update(guard=these))
     monkeypatch.setattr(process, "EventNotes", lambda *these: made.update(notes=these))
@@ -276,6 +277,7 @@ def test_keeper_has_its_line_shared_gated_and_under_its_lock(
     assert made["gated"] is True
     assert made["guard"] == (keeper._line, "journal")
     assert made["notes"] == (keeper._line.facts, keeper._events)
+    assert keeper._recorder == ("recorder", keeper._line, ORDER.place.name)
     assert heard == [keeper._hear]
     assert isinstance(keeper._events, EventLog)
     (keeping,) = made["share"].args
