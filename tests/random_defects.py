@@ -60,6 +60,7 @@ NOT_RECORDED = {
         "tests/line/test_keeper.py",
         "tests/line/test_hung_keepers.py",
     ),
+    "tui/bus/*": ("tests/bus/test_whole_state.py", "tests/bus/test_whole_values.py"),
     "tui/drive/*": (
         "tests/drive/test_whole_values.py",
         "tests/drive/test_whole_files.py",

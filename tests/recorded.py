@@ -69,6 +69,7 @@ def short(found: object) -> str:
 
 
 RECORDED = (
+    "bus.test_whole_state", "bus.test_whole_values",
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
     "session.test_recorded_texts", "session.test_recorded_records",
     "session.test_recorded_recorders", "session.test_recorded_steps",
