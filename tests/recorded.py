@@ -68,6 +68,23 @@ def short(found: object) -> str:
     return repr(found)
 
 
+def filled(found: Any) -> str:
+    """The fields of an object that are not empty."""
+    if dataclasses.is_dataclass(found):
+        names = [field.name for field in dataclasses.fields(found)]
+    elif not (names := list(getattr(found, "_fields", ()))):
+        return f"{found}"
+    values = {name: getattr(found, name) for name in names}
+    shown = {name: value for name, value in values.items() if value and value != (0, 0)}
+    return ", ".join(f"{name} {_plain(value)}" for name, value in shown.items())
+
+
+def _plain(value: object) -> str:
+    if isinstance(value, frozenset):
+        return f"{sorted(value)}"
+    return f"{value:.2f}" if isinstance(value, float) else f"{value}"
+
+
 RECORDED = (
     "bus.test_whole_state", "bus.test_whole_values",
     "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
@@ -75,6 +92,7 @@ RECORDED = (
     "session.test_recorded_recorders", "session.test_recorded_steps",
     "session.test_recorded_traffic",
     "session.test_recorded_monitoring",
+    "session.test_recorded_examinations", "session.test_recorded_connections",
     "ui.test_recorded_drawings", "ui.test_recorded_keys",
     "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
     "cli.test_recorded_values", "cli.test_recorded_states",

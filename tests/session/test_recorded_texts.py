@@ -19,8 +19,8 @@ import pytest
 
 from tests.drive.test_whole_files import HEAD, OWN_SET
 from tests.drive.test_whole_values import whole
-from tests.recorded import sections
-from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
+from tests.recorded import filled, sections
+from tui.bus.errors import OWNER_SILENT, LineLost, NotShared, PortBusy, PortMissing, PortRefused
 from tui.bus.link import SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.ports import PortSeen
@@ -213,6 +213,53 @@ def diagnoses() -> Iterator[str]:
             yield diagnosed(replace(plain, **first, **second)).rung
 
 
+BUSY = PortSeen("/dev/ttyUSB0", holder="mbpoll (4711)", latency=16)
+ANSWERED = ReplyEvidence(requested=3, answered=2)
+MORE_SIGHTS: tuple[dict[str, Any], ...] = (
+    {"trouble": PortBusy("busy", "panel (7)")}, {"trouble": PortBusy("busy"), "port": BUSY},
+    {"trouble": LineLost("lost"), "port": BUSY}, {"trouble": LineLost(f"panel {OWNER_SILENT}.")},
+    {"trouble": PortMissing("gone", ["/dev/ttyS0"])}, {"heard": ANSWERED, "idle": 3.0},
+    {"heard": ANSWERED, "turnaround": 0.004, "changed": "Another adapter. Look at it."},
+    *({"heard": ANSWERED, "turnaround": late, "port": BUSY._replace(latency=latency)}
+      for late, latency in ((0.012, 16), (0.0119, 16), (0.1, 8), (0.1, 7))),
+    *({"measure": replace(Measure(requested=30, answered=20, seconds=6.0, late=3), **counts)}
+      for counts in ({"behind": 3}, {"behind": 4}, {"behind": 10}, {"behind": 12}, {"late": 2},
+                     {"swapped": 3}, {"swapped": 2}, {"swapped": 4, "straight": 1}, {"second": 2},
+                     {"turns": 2, "damaged": 2}, {"turns": 1, "damaged": 2}, {"damaged": 5})),
+    *({"heard": ReplyEvidence(requested=4, garbage=count, compared=(came, due)), "errors": errors}
+      for count, came, due in ((9, 9, 9), (9, 9, 7), (9, 13, 10), (9, 5, 0), (9, 0, 9))
+      for errors in (PortErrors(0, 0, 0, 0), PortErrors(2, 1, 1, 0))),
+    {"heard": replace(ANSWERED, damaged=2), "errors": PortErrors(1, 2, 3, 4)},
+    {"heard": ReplyEvidence(requested=3, exceptions=(10, 2), functions=(4, 6))},
+)  # fmt: skip
+
+
+def advice() -> Iterator[str]:
+    """Verdicts of more evidence, then what the manuals of families say to silence and garbage."""
+    families = [library.load(name) for name in ("atv312", "atv21", "powerdrive", "varmeca")]
+    plain = DiagnosticEvidence(SERIAL, 3, heard=ReplyEvidence(requested=9))
+    for facts in MORE_SIGHTS:
+        at_port = facts.keys() & {"port", "trouble", "errors"}
+        for link, known in ((SERIAL, None), (SERIAL if at_port else NETWORK, families[0])):
+            found = diagnosed(replace(plain, link=link, profile=known, **facts))
+            shown = (f"{name}: {filled(fact)}" for name, fact in facts.items())
+            yield f"{'; '.join(shown)} on {link}, {known is not None} {found.well}"
+            yield f"  {found.rung}: {found.text} {found.certainty} {found.others}"
+            yield from (f"  > {step}" for step in found.steps)
+    garbled = ReplyEvidence(requested=5, garbage=40, compared=(40, 40))
+    for profile in (whole(), *families):
+        own_link = profile.data.link
+        own = SerialLink(SERIAL.path, own_link.baud, own_link.format)
+        for device, link in (
+            (1, own), (3, SERIAL), (10, NETWORK), (50, SerialLink(SERIAL.path, 1200, "8O2")),
+            (247, SerialLink(SERIAL.path, own_link.baud, "8O2")), (0, own),
+        ):  # fmt: skip
+            for heard in (ReplyEvidence(requested=9), garbled):
+                found = diagnosed(DiagnosticEvidence(link, device, profile, heard=heard))
+                yield f"{profile.id} {device} {link}: {found.rung}, {found.text}"
+                yield from (f"  > {step}" for step in found.steps)
+
+
 HOMES = "/".join(("", "home"))
 """Folders of people, invented; no file of the project may name one of this machine."""
 
@@ -290,7 +337,7 @@ def fault_of(text: str, family: str) -> str:
     return f"{[step.step for step in guide.steps]}"
 
 
-SECTIONS = (past, report, counters, diagnoses, redactions, start_ups, guide_faults)
+SECTIONS = (past, report, counters, diagnoses, advice, redactions, start_ups, guide_faults)
 
 
 @pytest.fixture

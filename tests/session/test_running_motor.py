@@ -557,6 +557,35 @@ def test_async_blocks_run_and_stop_the_motor(bench: MotorBench) -> None:
     asyncio.run(script())
 
 
+def test_loop_of_the_script_runs_while_the_motor_starts_and_stops(bench: MotorBench) -> None:
+    line = AsyncDriveLine(bench.line._calls._opened)
+    turns: list[float] = []
+
+    async def count_turns() -> None:
+        while True:
+            turns.append(bench.simulation.drive(1).motor.frequency)
+            await asyncio.sleep(0)
+
+    def counted() -> int:
+        found = len(turns)
+        turns.clear()
+        return found
+
+    async def script() -> None:
+        drive = await line.drive(profile="atv71")
+        counting = asyncio.create_task(count_turns())
+        with drive.armed():
+            async with drive.running("20Hz") as motor:
+                assert counted() > 1, "it went on while the motor started"
+                await motor.wait(0.1)
+                assert counted() > 1, "it went on while the motor ran"
+            assert counted() > 1, "it went on while the motor stopped"
+            assert bench.stands
+        counting.cancel()
+
+    asyncio.run(script())
+
+
 def test_motor_of_a_cancelled_task_is_stopped_at_any_moment(bench: MotorBench) -> None:
     line = AsyncDriveLine(bench.line._calls._opened)
 

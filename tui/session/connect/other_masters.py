@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
@@ -72,7 +73,7 @@ def overheard(frames: Iterable[Frame], since: float) -> Overheard:
     for frame in frames:
         if frame.direction == "out":
             ours.add(frame.data)
-        elif frame.time < since or frame.data in ours:
+        elif frame.time <= since or frame.data in ours:
             continue
         elif is_whole(frame.data):
             request = overheard_request(frame.data)
@@ -92,7 +93,7 @@ async def listen_first(
     since, before = _last_time(line.trace), line.counters.bytes_in
     await clock.sleep(seconds)
     found = overheard(line.trace, since)
-    new = [frame for frame in line.trace if frame.time >= since]
+    new = [frame for frame in line.trace if frame.time > since]
     if found.text or any(frame.direction == "out" for frame in new):
         return found
     # an incomplete frame: monitoring ended in the middle of another master's traffic
@@ -116,4 +117,4 @@ class MasterDetector:
 
 def _last_time(frames: Sequence[Frame]) -> float:
     """Time of the latest frame; later frames are new."""
-    return frames[-1].time + 1e-9 if frames else 0.0
+    return frames[-1].time if frames else -math.inf

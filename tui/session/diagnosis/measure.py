@@ -123,11 +123,11 @@ def measure_of(
             ours = body[:1] == bytes([device]) and not (echoes and body[1] == DIAGNOSE)
             if ours:
                 exchanges.append(_Exchange(body, frame.time, frame.data[: TRANSACTION_BYTES * tcp]))
-        elif not ours or _is_echo(frame, body, exchanges[-1]):
+        elif not ours or len(body) < 2 or _is_echo(frame, body, exchanges[-1]):
             continue
         elif not tcp and not is_whole(frame.data):
             _loose(found, exchanges[-1], frame)
-        elif body[0] == device and body[1] & REFUSED and body[2] in unreached:
+        elif body[0] == device and body[1] & REFUSED and body[-1] in unreached:
             found.unreached += 1
             exchanges[-1].sick = True
         elif body[0] == device:

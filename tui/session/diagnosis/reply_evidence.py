@@ -90,7 +90,7 @@ def _with(
         data = frame.data
         if not tcp and data == request:
             found = replace(found, echoed=found.echoed + 1)
-        elif tcp or is_whole(data):
+        elif len(data) > TCP_HEAD + 1 if tcp else is_whole(data):
             body = data[TCP_HEAD:] if tcp else data[:-2]
             found = _with_whole(found, requested, body, late=frame.note.startswith(LATE_NOTE))
             alone = False
@@ -141,6 +141,10 @@ def _once(known: tuple[int, ...], new: int) -> tuple[int, ...]:
     return known if new in known else (*known, new)
 
 
+def _differs(received: bytes, function: int) -> bool:
+    return len(received) > 1 and received[1] != function
+
+
 def evidence_of_errors(outcomes: Iterable[LineError | None], device: int) -> ReplyEvidence:
     """Return the same counts from the results of requests, None for an answer, if frames are
     missing."""
@@ -157,7 +161,7 @@ def evidence_of_errors(outcomes: Iterable[LineError | None], device: int) -> Rep
                 found = _with_loose(found, request, received, alone=True)
             case WrongReply(received=received) if is_whole(received) and received[0] != device:
                 found = replace(found, others=_once(found.others, received[0]))
-            case WrongReply(received=received, function=function) if len(received) > 1:
+            case WrongReply(received=received, function=function) if _differs(received, function):
                 found = replace(found, functions=_once(found.functions, received[1]))
             case WrongReply():
                 found = replace(found, misshapen=found.misshapen + 1)
