@@ -96,7 +96,7 @@ RECORDED = (
     "ui.test_recorded_drawings", "ui.test_recorded_keys",
     "ui.test_recorded_pages", "ui.test_recorded_lists", "ui.test_recorded_start_up",
     "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
-    "cli.test_recorded_values", "cli.test_recorded_states",
+    "cli.test_recorded_values", "cli.test_recorded_states", "cli.test_recorded_reports",
 )  # fmt: skip
 """Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
 

@@ -83,10 +83,10 @@ def terminal(**environment: str) -> Iterator[None]:
 
 
 @contextmanager
-def printed(out: io.StringIO | None = None) -> Iterator[list[str]]:
+def printed(out: io.StringIO | None = None, err: io.StringIO | None = None) -> Iterator[list[str]]:
     """Lines printed inside, those of standard error behind a mark."""
     lines: list[str] = []
-    out, err = out or io.StringIO(), io.StringIO()
+    out, err = out or io.StringIO(), err or io.StringIO()
     with redirect_stdout(out), redirect_stderr(err):
         yield lines
     lines += out.getvalue().splitlines()
