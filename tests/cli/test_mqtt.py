@@ -1,34 +1,23 @@
-"""Output to a broker: topics, messages, passwords, and the cost of a lost connection."""
+"""Output to a broker: topics, messages, the broker and its password."""
 
 from __future__ import annotations
 
-import asyncio
 import json
-import logging
 import socket
 import sys
-from collections.abc import AsyncIterator
 from pathlib import Path
-from types import SimpleNamespace, TracebackType
-from typing import Any
 
-import aiomqtt
 import click
 import pytest
 
-from tests.session.test_stop import wait_for
-from tui.cli.plant import mqtt
 from tui.cli.plant.broker import PASSWORD_SETTING, Broker, broker_of, level, need_mqtt
-from tui.cli.plant.mqtt import MqttPublisher, client_id
-from tui.cli.plant.status import DriveStatus, LineReport
+from tui.cli.plant.mqtt import client_id
+from tui.cli.plant.status import DriveStatus
 from tui.cli.plant.topics import drive_messages, line_messages, line_topics
 from tui.cli.shared.errors import Failure
 
 from .commands import refused
 from .plant_sights import cycle, drive_of, failed, line_of, small_drive
-
-BROKER = Broker("broker", 1883, False, None, None, "plant")
-
 
 # Topics and messages
 
@@ -140,102 +129,3 @@ def test_missing_package_is_reported_with_what_to_install(
 
 def test_client_id_depends_on_the_topic_root() -> None:
     assert client_id("plant") == client_id("plant") != client_id("plant/hall")
-
-
-# Connections
-
-
-class FakeClient:
-    """A broker that keeps what is retained; `lose` ends its connection."""
-
-    made: list[FakeClient] = []
-    refuses = 0
-
-    def __init__(self, host: str, port: int, **how: Any) -> None:
-        self.how = how
-        self.retained: dict[str, str] = {}
-        self.lost = asyncio.Event()
-        self.made.append(self)
-
-    async def __aenter__(self) -> FakeClient:
-        if len(self.made) <= self.refuses:
-            raise aiomqtt.MqttError("[Errno 111] Connection refused")
-        return self
-
-    async def __aexit__(
-        self, kind: type[BaseException] | None, error: object, tb: TracebackType | None
-    ) -> None:
-        return
-
-    async def publish(self, topic: str, text: str, **how: Any) -> None:
-        if self.lost.is_set():
-            raise aiomqtt.MqttError("not connected")
-        assert how["retain"] is True
-        self.retained[topic] = text
-
-    @property
-    async def messages(self) -> AsyncIterator[object]:
-        yield SimpleNamespace(topic="plant/pump/2/set", payload=b"1")
-        await self.lost.wait()
-        raise aiomqtt.MqttError("lost")
-
-
-@pytest.fixture
-def clients(monkeypatch: pytest.MonkeyPatch) -> type[FakeClient]:
-    class Own(FakeClient):
-        made = []
-
-    monkeypatch.setattr(aiomqtt, "Client", Own)
-    monkeypatch.setattr(mqtt, "TRY_AGAIN_FIRST", 0.01)
-    return Own
-
-
-async def test_everything_is_retained_again_after_a_lost_connection(
-    clients: type[FakeClient], capsys: pytest.CaptureFixture[str]
-) -> None:
-    clients.refuses = 2
-    sights: list[LineReport] = [line_of(drive_of(cycle(small_drive(), ETA=0x27, RFR=1)))]
-    publisher = MqttPublisher(BROKER, lambda: sights)
-    task = asyncio.create_task(publisher.run())
-    topics = {"plant/status", "plant/pump/line", "plant/pump/2"}
-    await wait_for(lambda: len(clients.made) == 3 and set(clients.made[2].retained) == topics)
-    first = clients.made[2]
-    assert first.how["will"] == aiomqtt.Will("plant/status", "offline", qos=1, retain=True)
-    assert first.retained["plant/status"] == "online"
-    # unsolicited messages of a broker fill no terminal and no log
-    assert not first.how["logger"].isEnabledFor(logging.ERROR)
-    assert first.how["max_queued_incoming_messages"] == 1
-
-    sights[:] = [line_of(drive_of(cycle(small_drive(), ETA=0x27, RFR=2)))]
-    publisher.news()
-    await wait_for(lambda: '"value": 0.2' in first.retained["plant/pump/2"])
-
-    first.lost.set()
-    await wait_for(lambda: len(clients.made) == 4 and set(clients.made[3].retained) == topics)
-    publisher.end()
-    await task
-    assert clients.made[3].retained["plant/status"] == "offline"
-    output = capsys.readouterr().err
-    assert output.count("Retrying.") == 2
-    assert output.count("is connected again.") == 2
-    assert ": Connection refused. Retrying." in output
-    assert "Errno" not in output
-
-
-@pytest.mark.internal_errors
-async def test_unforeseen_error_does_not_end_publishing(
-    clients: type[FakeClient],
-) -> None:
-    wrong = [True]
-
-    def sights() -> list[LineReport]:
-        if wrong:
-            raise RuntimeError(wrong.pop())
-        return [line_of()]
-
-    publisher = MqttPublisher(BROKER, sights)
-    task = asyncio.create_task(publisher.run())
-    await wait_for(lambda: bool(clients.made) and "plant/pump/line" in clients.made[-1].retained)
-    assert clients.made[0].retained == {"plant/status": "offline"}
-    publisher.end()
-    await task

@@ -178,8 +178,8 @@ def writes() -> Iterator[str]:
         found = [Result(edits[0], each, "") for each in (first, second) if each is not None]
         yield f"{first} {second}: {status_of_results(found)}"
     for voided, beyond in product((False, True), repeat=2):
-        one = Result(edits[0], EditOutcome.NOT_SENT, "", voided=voided, is_beyond_limit=beyond)
-        yield f"{voided} {beyond}: {status_of_results([one])}"
+        result = Result(edits[0], EditOutcome.NOT_SENT, "", voided=voided, is_beyond_limit=beyond)
+        yield f"{voided} {beyond}: {status_of_results([result])}"
     absent = {"A": "Exception 2, register 7", "B": "Exception 2, register 8", "C": "No reply"}
     for codes in ("", "ABC", "A"):
         with printed() as lines:
@@ -188,7 +188,7 @@ def writes() -> Iterator[str]:
 
 
 def saves() -> Iterator[str]:
-    """Whether settings are kept, for families with each way to save."""
+    """Settings that are lost at power-off, for families with each way to save."""
     for family in ("atv71", "atv21", "powerdrive", "example-fan", "v20"):
         profile = whole() if family == "example-fan" else library.load(family)
         settings = [each.code for each in profile.parameters if each.access == "rw"][:3]

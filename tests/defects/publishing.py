@@ -5,7 +5,7 @@ from __future__ import annotations
 from .defect import Defect
 
 METRICS = "tests/cli/test_metrics.py"
-MQTT = "tests/cli/test_mqtt.py"
+MQTT = "tests/cli/test_mqtt_connections.py"
 BYSTANDER = "tests/session/test_bystander.py"
 
 DEFECTS = (
@@ -87,7 +87,7 @@ DEFECTS = (
         "if parts.password is not None:",
         "if False:",
         "Every user of the computer can read the password for the broker.",
-        (MQTT,),
+        ("tests/cli/test_mqtt.py",),
     ),
     Defect(
         "named-drive-forgotten",
