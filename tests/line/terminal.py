@@ -52,10 +52,24 @@ class Terminal:
             if question not in self.text():
                 return
 
+    def press_for(self, key: str, *words: str) -> None:
+        """Press a key and wait for its effect; press it again if the panel has ignored it."""
+
+        def shown() -> bool:
+            return all(word in self.text() for word in words)
+
+        while not shown():
+            self.press(key)
+            wait_until(lambda: shown() or self._has_ignored(), f"an effect of {key}")
+            time.sleep(A_MOMENT)
+
+    def _has_ignored(self) -> bool:
+        text = self.text()
+        return "Ignored a key" in text or "Key ignored" in text
+
     def _is_settled(self, question: str) -> bool:
         """True if a question is closed, or the panel reports that it has ignored a key."""
-        text = self.text()
-        return question not in text or "Ignored a key" in text or "Key ignored" in text
+        return question not in self.text() or self._has_ignored()
 
     def wait_for(self, *words: str) -> None:
         """Wait until all the words are on it."""

@@ -71,8 +71,7 @@ def test_leaving_a_disowned_motor_asks_first(terminal_with: Start, second_termin
         wait_until(lambda: not is_running(made.pid), "the panel is gone")
         terminal = again(second_terminal, made.line)
         terminal.wait_for("FORWARD", "Running since")
-        terminal.press("q")
-        terminal.wait_for("Quit the panel?", "30 s after")
+        terminal.press_for("q", "Quit the panel?", "30 s after")
         terminal.press("Escape")
         terminal.wait_for("FORWARD")
         assert made.speed > 2
