@@ -93,6 +93,7 @@ RECORDED = (
     "session.test_recorded_traffic",
     "session.test_recorded_monitoring",
     "session.test_recorded_examinations", "session.test_recorded_connections",
+    "session.test_recorded_gateway",
     "ui.test_recorded_drawings", "ui.test_recorded_keys",
     "ui.test_recorded_pages", "ui.test_recorded_lists", "ui.test_recorded_start_up",
     "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",

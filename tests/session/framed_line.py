@@ -74,6 +74,8 @@ class FramedLine(FakeLine):
         self.tally = Tally(clock=self.time.monotonic)
         self.frames: deque[Frame] = deque(maxlen=KEPT)
         super().__init__(registers, link=link, clock=self.time.monotonic)
+        self.diagnosed: dict[int, int] = {}
+        """Results of function 8, by sub-function; others give their data back."""
         self.usual: float | None = TURNAROUND
         self.longest: float | None = 2 * TURNAROUND
         """Turnarounds that the line knows once the device was asked."""
@@ -133,6 +135,8 @@ class FramedLine(FakeLine):
         result: Any = None
         try:
             result = carry_out()
+            if isinstance(request, Diagnose):
+                result = self.diagnosed.get(request.subfunction, result)
             body = _reply(request, result)
             error: LineError | None = None
         except DeviceException as refused:
@@ -151,6 +155,8 @@ class FramedLine(FakeLine):
             await self.time.sleep(max(0.0, begun + self._wait - self.time.now))
         else:
             await self.time.sleep(ON_THE_WIRE)
+        received = sum(len(piece) for _, piece, _ in pieces)
+        tally.count_end(device, self.time.now - begun, received)
         if self.state.status is not LineStatus.CONNECTED:
             raise LineLost(self.state.reason)
         own = self._device(device)

@@ -6,10 +6,12 @@
 from __future__ import annotations
 
 import asyncio
+import tempfile
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import is_dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -33,11 +35,14 @@ from tui.bus.model import LineStatus
 from tui.bus.program import Program
 from tui.bus.transport.ports import PortSeen
 from tui.drive.profile import library
+from tui.session.counters.watch import CounterWatch
 from tui.session.diagnosis import asking, examining, short_reads
 from tui.session.diagnosis.diagnosis import diagnosed
 from tui.session.diagnosis.evidence import DiagnosticEvidence
 from tui.session.diagnosis.examining import examine_line
 from tui.session.diagnosis.reply_evidence import evidence_of_errors
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
 from tui.wire.frames import frame
 
 TEXTS = Path(__file__).parent / "recorded_examinations.txt"
@@ -516,7 +521,66 @@ def errors() -> Iterator[str]:
             yield f"{outcome}: {filled(evidence_of_errors(outcomes, DEVICE))}"
 
 
-SECTIONS = (faults, drives, serial_lines, gateways, errors)
+def counter_watches() -> Iterator[str]:
+    """Counters of drives compared with the line's, over several readings."""
+    for family, fault in product(("atv71", "atv312", "powerdrive"), (well, at_times(3, lost))):
+        line = line_of(SERIAL, fault, registers(family))
+        line.tally.count_sent(DEVICE, 8)
+        line.hear("in", SLAVE, STRAY)
+        watch = CounterWatch(DriveSession(line, DEVICE, library.load(family), clock=line.time))
+        yield f"{family}: {watch.has_diagnostics} {watch.can_reset_drive} {watch.counted_by!r}"
+        with tempfile.TemporaryDirectory() as folder:
+            yield from asyncio.run(counted_watch(watch, line, Journal(Path(folder))))
+
+
+async def counted_watch(watch: CounterWatch, line: FramedLine, journal: Journal) -> list[str]:
+    """Each reading of both sides, while the drive counts more or less than was sent."""
+    found: list[str] = []
+
+    def note(title: str) -> None:
+        now = watch.now()
+        found.append(f"  {title}: {now.agree} {now.agreeing} {now.trouble}")
+        loads = [load and round(load, 3) for load in (now.line_load, now.device_load)]
+        found.append(f"    {now.seconds:.2f} s, {loads}, {now.counted_by!r}")
+        found.extend(f"    {each.kind} {each.count}: {each.text}" for each in now.differences)
+        found.extend(f"    {name}: {comparison}" for name, comparison in now.drive)
+        counts = (now.total, now.since)
+        found.extend(f"    {c.requests} {c.replies} {c.timeouts}" for c in counts)
+        found.append(f"    {'; '.join(line.sent)}")
+        line.sent.clear()
+
+    note("first")
+    for frames, damaged in ((100, 5), (112, 5), (118, 6), (900, 6), (3, 0), (9, 0)):
+        line.diagnosed = {0x0C: damaged, 0x0E: frames}
+        await watch.look()
+        found.append(f"  echoes {await watch.echo(4)}")
+        note(f"{frames} {damaged}")
+    line.hear("in", SLAVE, STRAY)
+    line.tally.stale += 2
+    note("strays")
+    attach(line)
+    await watch.look()
+    note("attached")
+    watch.reset_ours()
+    note("reset")
+    try:
+        await watch.reset_drive(journal)
+    except LineError as error:
+        found.append(f"  {type(error).__name__}: {error}")
+    note("reset there")
+    for entry in journal.sent:
+        found.append(f"  {entry.code} {entry.address} {entry.new} {entry.answer} {entry.why}")
+        found.append(f"  {entry.kind} {entry.old_raw} {entry.old!r} {entry.new_raw} {entry.line}")
+    line.read_only = True
+    found.append(f"  {watch.can_reset_drive}")
+    line.become(LineStatus.LOST, "cut")
+    await watch.look()
+    note("cut")
+    journal.close()
+    return found
+
+
+SECTIONS = (faults, drives, serial_lines, gateways, errors, counter_watches)
 
 
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)
