@@ -113,5 +113,8 @@ EQUIVALENT: dict[str, str] = {
     "tui/session/monitor/trend.py:Trend.join: constant: 0.0 -> 1.0": (
         "It is the last time of no points, which none is compared with."
     ),
+    "tui/session/monitor/line_watch.py:LineWatch._last_seen: constant: 0.0 -> 1.0": (
+        "The time counts from the start of the computer: no cycle ends in its first second."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

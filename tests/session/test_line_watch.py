@@ -7,6 +7,7 @@ import time
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import suppress
 from dataclasses import replace
+from threading import Thread
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -157,6 +158,26 @@ async def test_drive_of_unknown_family_is_kept_alive_until_it_is_known() -> None
     assert [(alive.device, alive.timeout) for alive in kept_alive(line)] == [(7, UNKNOWN_TIMEOUT)]
     strangers.stop()
     assert kept_alive(line) == []
+
+
+async def test_unknown_drive_that_is_let_go_as_it_is_found_is_not_kept_alive(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    line = BackgroundListener(20)
+    strangers, keep_alives = UnknownDrivePoller(line), line.facts.keep_alives
+    keep, others = keep_alives.keep, [Thread(target=strangers.let_go, args=(7,))]
+
+    def let_go_first(alive: KeepAlive) -> None:
+        for thread in others:
+            thread.start()
+            thread.join(0.05)  # it waits for the lock
+        keep(alive)
+
+    monkeypatch.setattr(keep_alives, "keep", let_go_first)
+    strangers.keep(7)
+    await until(lambda: others[0].ident is not None and not others[0].is_alive())
+    await until(lambda: kept_alive(line) == [])
+    strangers.stop()
 
 
 async def test_drive_is_kept_alive_while_its_timeout_is_learned(

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from tests.waiting import until
 from tui.bus.api import LineWorker, Priority
 from tui.bus.errors import ChecksumFault, LineLost, NoAnswer
 from tui.session.drive import DriveSession
@@ -20,6 +21,7 @@ from tui.session.read.rotation import Rotation
 from tui.session.shown import Quality
 
 from .fakes import OneDrive, parameter, profile_of
+from .test_prover import OwnTime
 
 Cycles = list[tuple[Snapshot, list[int]]]
 """Each snapshot with the addresses requested for it."""
@@ -311,3 +313,30 @@ async def test_cycle_without_any_value_is_not_a_refusal(bench: Bench) -> None:
     for snapshot, _ in await bench.run(2):
         assert not snapshot.readings
         assert snapshot.contact != "refused"
+
+
+async def test_measured_period_is_the_average_of_the_last_cycles() -> None:
+    class Slow(FaultyLine):
+        """Each cycle takes a tenth of a second longer than the one before."""
+
+        async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+            if registers.start == STATE:
+                clock.now += 0.6 + len(found) / 10
+
+    clock, line = OwnTime(), Slow()
+    session = DriveSession(line, 1, PROFILE, clock=clock)
+    monitor = Monitor(session)
+    found: list[Snapshot] = []
+    monitor.listen(lambda cycle: monitor.stop() if len(found) == 9 else found.append(cycle))
+    monitor.start(("STATE",), period=0.5)
+    await until(lambda: not monitor.running)
+    took = [0.6 + number / 10 for number in range(9)]
+    spans = [took[max(0, number - 5) : number] for number in range(9)]
+    periods = [sum(span) / len(span) if span else 0.5 for span in spans]
+    assert [cycle.period for cycle in found] == pytest.approx(periods)
+    assert [cycle.rate for cycle in found] == pytest.approx([1 / period for period in periods])
+    assert [cycle.cycle for cycle in found] == list(range(1, 10))
+    assert {cycle.wished for cycle in found} == {0.5}
+    assert [cycle.time - found[0].time for cycle in found] == pytest.approx(
+        [sum(took[1:number]) for number in range(1, 10)]
+    )

@@ -393,6 +393,21 @@ async def test_motor_that_slows_down_has_reacted(status: int, hertz: float, seen
     assert result.fault == ""
 
 
+async def test_stop_within_a_silence_ends_it_at_once() -> None:
+    clock = OwnTime()
+    prover = bench(clock, WatchingDrive(clock, math.inf, held=40.0))
+    begun: list[float] = []
+
+    def pause(_: str) -> None:
+        begun.append(clock.now)
+        prover.session.work.stop("the stop key")
+
+    prover.report = pause
+    with pytest.raises(Stopped):
+        await prover.prove()
+    assert [clock.now - since for since in begun] == [0.0], "a pause of 10 s had begun"
+
+
 async def test_stop_at_the_end_of_a_silence_prevents_the_read() -> None:
     begun: list[float] = []
 
