@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import product
@@ -316,7 +317,8 @@ def evidence() -> Iterator[str]:
     for kind, found in (
         ("drive", rows), ("drive", right), ("drive", many[:1]), ("simulated", many),
         ("unknown", right), ("drive", [row for row in right if row.subject != "value"]),
-        ("drive", []), ("drive", many[:21]),
+        ("drive", []), ("drive", many[:21]), ("drive", many[:20]),
+        ("drive", [row for row in right if row.subject == "command"]),
     ):  # fmt: skip
         tested = EvidenceDrive(vendor="V", reference="R", firmware="1", kind=kind, link="RTU")  # type: ignore[arg-type]
         made = ProfileEvidence(profile="p", date="d", program="1", tested=tested, findings=found)
@@ -327,6 +329,11 @@ def evidence() -> Iterator[str]:
             yield f"-- {kind} {len(found)}"
             yield from lines if not err else (text[:9] for text in lines[:1])
         yield json_text(confirming._document(made, Path("x.json")))
+    for link in (SerialLink("/dev/x", 9600, "8N1"), RtuTcpLink("h", 1), TcpLink("h")):
+        line = FakeLine({7: {}}, link=link)
+        yield confirming._link_text(DriveSession(line, 7, whole()))
+    for simulation in (None, cast(Any, object())):
+        yield asyncio.run(confirming.drive_kind(OpenLine("x", line, simulation)))
 
 
 def proofs() -> Iterator[str]:
