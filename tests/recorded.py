@@ -85,28 +85,22 @@ def _plain(value: object) -> str:
     return f"{value:.2f}" if isinstance(value, float) else f"{value}"
 
 
-RECORDED = (
-    "bus.test_whole_state", "bus.test_whole_values",
-    "drive.test_whole_values", "drive.test_whole_files", "session.test_recorded_files",
-    "session.test_recorded_texts", "session.test_recorded_records",
-    "session.test_recorded_recorders", "session.test_recorded_steps",
-    "session.test_recorded_traffic",
-    "session.test_recorded_monitoring",
-    "session.test_recorded_examinations", "session.test_recorded_connections",
-    "session.test_recorded_gateway",
-    "ui.test_recorded_drawings", "ui.test_recorded_keys",
-    "ui.test_recorded_pages", "ui.test_recorded_lists", "ui.test_recorded_start_up",
-    "cli.test_recorded_refusals", "cli.test_recorded_outputs", "test_tables",
-    "cli.test_recorded_values", "cli.test_recorded_states", "cli.test_recorded_reports",
-)  # fmt: skip
-"""Tests with `SECTIONS`, and the path of their file in `TEXTS`."""
+def recorded_modules() -> Iterator[str]:
+    """Yield the names of tests with `SECTIONS`, and the path of their file in `TEXTS`."""
+    folder = Path(__file__).parent
+    for path in sorted(folder.rglob("test_*.py")):
+        text = path.read_text("utf-8")
+        if "\nSECTIONS" in text and "\nTEXTS" in text:
+            yield ".".join(path.relative_to(folder.parent).with_suffix("").parts)
+
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
         own = {f"DRIVEPANEL_{name}": f"{folder}/{name}" for name in ("CONFIG", "STATE")}
         os.environ.update(own, HOME=folder, TZ="UTC", LC_ALL="C.UTF-8", DRIVEPANEL_RECORD="off")
         time.tzset()
-        for name in (name for name in RECORDED if all(word in name for word in sys.argv[1:])):
-            module = importlib.import_module(f"tests.{name}")
-            write_sections(module.TEXTS, module.SECTIONS)
+        for name in recorded_modules():
+            if all(word in name for word in sys.argv[1:]):
+                module = importlib.import_module(name)
+                write_sections(module.TEXTS, module.SECTIONS)
     importlib.import_module("tests.drive.test_whole_profile").write_faults()
