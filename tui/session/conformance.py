@@ -107,11 +107,11 @@ class Conformance:
             result: EvidenceResult = "confirmed" if agreeing else "contradicted"
             if not seen or (not any(agreeing) and agreeing and not is_enumeration(parameter)):
                 result = "open"  # without a value, or with 0, which agrees with every scale
-            text = "Display {typed}, read {values} (raw {raws})."
             raws = ", ".join(dict.fromkeys(map(str, seen)))
-            finding = self._finding(
-                parameter, result, text.format(typed=typed, values=values, raws=raws)
-            )
+            text = f"Display {typed}, read {values} (raw {raws})."
+            if not seen:
+                text = f"Display {typed}. The value could not be read."
+            finding = self._finding(parameter, result, text)
         self.findings = [f for f in self.findings if (f.subject, f.name) != ("value", code)]
         self.findings.append(finding)
         return finding
