@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import json
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 from tui.bus.errors import PortRefused
@@ -76,3 +80,37 @@ async def test_other_settings_are_tried_only_if_no_drive_may_react(
     assert families.startswith("drivepanel: Drives of these families start")
     expected = [LISTENING, *(f"drivepanel: {note}" for note in notes)][not listens :]
     assert "\n".join(reported) == "\n".join(expected)
+
+
+@pytest.mark.parametrize("before", [[FIRST], [FIRST, SECOND]])
+async def test_slow_settings_are_announced_once_before_the_first_of_them(
+    before: list[LineSetting], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.01)
+    monkeypatch.setattr("tui.session.diagnosis.asking.FRAMES_COME_WITHIN", 0.01)
+    slow_ones = [LineSetting(baud, "8N1") for baud in (600, 300, 110)]
+    settings = [*before, *slow_ones]
+    announced: list[tuple[list[LineSetting], str]] = []
+
+    def before_slow(later: list[LineSetting], key: str) -> str:
+        announced.append(([*later], key))
+        return "These are slow."
+
+    costs: Any = SimpleNamespace(before_slow=before_slow, seconds=lambda later: 10.0 * len(later))
+    opened = OpenLine(
+        "/dev/null",
+        FakeLine({}, link=SerialLink("/dev/null", 19200, "8E1")),
+        again=lambda link: FakeLine({}, link=link),
+    )
+    telling = ScanTelling("/dev/null", as_json=True)
+    scan = Scan(opened, "/dev/null", [2, 3], telling, [*settings], costs)
+    await scan.run()
+    assert (scan.tried, scan.hits, scan.held_back) == (settings, [], "")
+    assert announced == [(slow_ones, "Ctrl-C")]
+    output = capsys.readouterr()
+    assert output.err.count("drivepanel: These are slow.") == 1
+    _, slow = map(json.loads, output.out.splitlines())
+    assert (slow["event"], slow["seconds"], slow["text"]) == ("slow", 30.0, "These are slow.")
+    assert [(each["baud"], each["format"]) for each in slow["settings"]] == [
+        (600, "8N1"), (300, "8N1"), (110, "8N1"),
+    ]  # fmt: skip
