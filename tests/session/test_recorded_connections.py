@@ -278,6 +278,7 @@ def known_lines() -> Iterator[str]:
             ):
                 line = FakeLine({}, link=SerialLink(at) if isinstance(at, str) else at)
                 known = KnownLine(line, way="Look.")
+                yield hidden(f"  at first {load_memory().names} {len(load_memory().lines)}", folder)
                 if accepts == ("all",):
                     known.accept(all_that_comes=True)
                 for identity, device, profile in drives:
@@ -348,6 +349,7 @@ def masters() -> Iterator[str]:
         ("own", [("out", read, ""), ("in", read, "echo"), ("in", reply, "")]),
         ("own and noise", [("out", read, ""), ("in", b"\0\0\0\0\0", "noise")]),
         ("an echo", [("in", read, "echo of it")]), ("our reply", [("in", reply, "")]),
+        ("own, late", [("out", read, ""), ("in", read, late)]),
         ("many", [("in", frame(7, bytes([3, 0, n, 0, n])), late) for n in range(6)]),
         ("other notes", [("in", b"\0\0\0\0", "damaged"), ("in", reply, "of device 7")]),
     )  # fmt: skip
