@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import click
 import pytest
@@ -92,3 +93,28 @@ def test_rate_is_refused_if_the_line_cannot_achieve_it(
         check_rate(link, every, drives)
     assert refusal.value.status == USAGE
     assert "Use a longer cycle" in refusal.value.message
+
+
+FIVE_DRIVES = ",".join(f"atv71@{device}" for device in range(1, 6))
+EACH_DRIVE = [word for device in range(1, 6) for word in ("-d", str(device))]
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("watch", *EACH_DRIVE, "RFR", "--csv", "new"),
+        ("record", *EACH_DRIVE, "RFR", "--out", "new"),
+        ("publish", *EACH_DRIVE, "RFR", "--mqtt", "mqtt://127.0.0.1:1"),
+        ("serve", "--metrics", "127.0.0.1:0"),
+    ],
+    ids=lambda command: command[0],
+)
+def test_cycle_too_short_for_all_drives_of_the_line_is_refused(
+    command: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One of them alone could be read in that time."""
+    monkeypatch.chdir(tmp_path)
+    name, *more = command
+    message = refused(2, name, f"sim:{FIVE_DRIVES}", *more, "--every", "0.05")
+    assert "reading one word from 5 drives takes 0.063 s" in message
+    assert not Path("new").exists()
