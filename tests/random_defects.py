@@ -71,6 +71,16 @@ NOT_RECORDED = {
         "tests/cli/test_recorded_refusals.py",
         "tests/cli/test_recorded_outputs.py",
     ),
+    "tui/cli/commands/[brc]*.py": (
+        "tests/cli/test_recorded_scenes.py::test_outputs_of_commands_in_turn_are_the_recorded_ones"
+        "[restoring]",
+        "tests/cli/test_recorded_scenes.py::test_outputs_of_commands_in_turn_are_the_recorded_ones"
+        "[recipes]",
+    ),
+    "tui/cli/commands/profiles.py": (
+        "tests/cli/test_recorded_scenes.py::test_outputs_of_commands_in_turn_are_the_recorded_ones"
+        "[own-profiles]",
+    ),
     "tui/cli/derived.py": ("tests/cli/test_derived.py",),
     "tui/screens/*/registration.py": ("tests/ui/test_key_pages.py", "tests/ui/test_palette.py"),
     "tui/screens/blocks/registration.py": ("tests/ui/test_block_pictures.py",),
