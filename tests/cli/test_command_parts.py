@@ -39,7 +39,7 @@ def test_reaction_that_is_prevented_is_named(found: Timeout, text: str) -> None:
 
 async def held(missing: int, devices: list[int], monkeypatch: pytest.MonkeyPatch) -> list[Any]:
     """What is reported of drives that are to be kept polled; the first ones do not answer."""
-    told: list[Any] = []
+    reports: list[Any] = []
     profile = library.load("atv71")
 
     async def connected(_: object, target: Target) -> Any:
@@ -48,13 +48,13 @@ async def held(missing: int, devices: list[int], monkeypatch: pytest.MonkeyPatch
         return SimpleNamespace(device=target.device, profile=profile)
 
     monkeypatch.setattr(hold, "_connected", connected)
-    monkeypatch.setattr(hold, "complain", told.append)
+    monkeypatch.setattr(hold, "complain", reports.append)
     monkeypatch.setattr("tui.session.monitor.timeout.timeout_now", lambda _: Timeout(False))
     fleet = SimpleNamespace(found=[])
     holding = SimpleNamespace(fleet=fleet, take=fleet.found.append)
     targets = [Target("L", device, None) for device in devices]
-    await hold._take_all(cast(Any, None), targets, cast(Any, holding), lambda *e: told.append(e))
-    return told
+    await hold._take_all(cast(Any, None), targets, cast(Any, holding), lambda *e: reports.append(e))
+    return reports
 
 
 async def test_drives_that_answer_are_kept_polled(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -113,10 +113,10 @@ class Given:
     """A commander that takes commands, and what is reported of them."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, **options: Any) -> None:
-        self.said: list[Any] = []
+        self.calls: list[Any] = []
         commander = Mock(given=SimpleNamespace(reference_text="Reference 20.0 Hz (LFR)"))
         for name in ("run", "check_run", "order"):
-            getattr(commander, name).side_effect = lambda *w, n=name: self.said.append((n, *w))
+            getattr(commander, name).side_effect = lambda *w, n=name: self.calls.append((n, *w))
         console = Mock(commander=commander)
         console.session.profile.name = "Altivar 71"
 
@@ -125,11 +125,11 @@ class Given:
             return SimpleNamespace(text="Run forward: running.")
 
         monkeypatch.setattr(run, "carried_out", carried)
-        monkeypatch.setattr(run, "arm_drive", lambda item: self.said.append(item is console))
+        monkeypatch.setattr(run, "arm_drive", lambda item: self.calls.append(item is console))
         made = {"order": "reverse", "reference": "20Hz", "seconds": None, "leave_running": False,
                 "unrecorded": False, "as_json": False, "take_control": False}  # fmt: skip
         wish = run.RunOptions(**{**made, **options})
-        telling = Mock(report=lambda *words: self.said.append(words))
+        telling = Mock(report=lambda *words: self.calls.append(words))
         self.command = run.RunCommand(console, wish, telling)
 
 
@@ -137,13 +137,13 @@ async def test_run_is_armed_and_given_with_its_reference(monkeypatch: pytest.Mon
     given = Given(monkeypatch)
     await given.command.prepare()
     await given.command.give()
-    assert given.said == [
+    assert given.calls == [
         True, ("run", "reverse", "20Hz"), ("reference", "Reference 20.0 Hz (LFR)"),
         ("order", "Run forward: running."),
     ]  # fmt: skip
     given = Given(monkeypatch, reference=None)
     await given.command.give()
-    assert given.said == [("run", "reverse", None), ("order", "Run forward: running.")]
+    assert given.calls == [("run", "reverse", None), ("order", "Run forward: running.")]
 
 
 @pytest.mark.parametrize("taken", [None, False, True])
@@ -165,7 +165,7 @@ async def test_control_is_taken_before_a_run(
         " back."
     )
     done = [("check_run", "reverse", "20Hz"), ("order", "take-control"), ("control", text)]
-    assert given.said == [True, *(() if taken else done)]
+    assert given.calls == [True, *(() if taken else done)]
 
 
 @pytest.mark.parametrize("way", ["", "run --take-control takes the control first."])
@@ -176,7 +176,7 @@ async def test_run_that_is_refused_names_the_way(way: str, monkeypatch: pytest.M
     with pytest.raises(Failure) as failed:
         await given.command.give()
     assert (failed.value.message, failed.value.status) == (f"Refused. {way}".rstrip(), 4)
-    assert given.said == []
+    assert given.calls == []
 
 
 # Watch

@@ -142,16 +142,16 @@ def test_status_of_a_test(passed: str, ended_by: str, number: int, status: int) 
 async def test_person_says_which_way_the_motor_turned(
     typed: str, turned: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked: list[str] = []
+    questions: list[str] = []
 
     async def answered(question: str) -> str:
-        asked.append(question)
+        questions.append(question)
         return typed
 
     monkeypatch.setattr("tui.cli.shared.asking.typed_answer", answered)
     session = accept.AcceptSession(Mock(), Mock(), Path("out"), "", False)
     assert await session._ask_turned("Which way?") == turned
-    assert asked == ["Which way? [r right / l left]"]
+    assert questions == ["Which way? [r right / l left]"]
 
 
 # Proofs of a communication loss
