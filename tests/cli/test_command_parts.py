@@ -38,7 +38,7 @@ def test_reaction_that_is_prevented_is_named(found: Timeout, text: str) -> None:
 
 
 async def held(missing: int, devices: list[int], monkeypatch: pytest.MonkeyPatch) -> list[Any]:
-    """What is reported of drives that are to be kept polled; the first ones do not answer."""
+    """Reports on drives that are to be kept polled; the first ones do not answer."""
     reports: list[Any] = []
     profile = library.load("atv71")
 

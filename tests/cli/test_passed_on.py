@@ -1,4 +1,4 @@
-"""What commands pass on of their arguments, complete: to the panel, a run, a gateway, a simulation.
+"""Arguments as commands pass them on, complete: to the panel, a run, a gateway, profiles.
 
 The part that would do the work is replaced, so nothing is opened or drawn.
 """
