@@ -265,7 +265,8 @@ async def test_held_drive_must_have_answered(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(hold, "connect_drive", connects)
     opened, target = Mock(), Target("L", 7, None)
     opened.line.device_state.return_value.heard = 1.0
-    assert await hold._connected(opened, target) == (opened, target)
+    found: Any = await hold._connected(opened, target)
+    assert found == (opened, target)
     opened.line.device_state.assert_called_once_with(7)
     opened.line.device_state.return_value.heard = None
     with pytest.raises(Failure, match=r"^Device 7 does not answer\.$") as failed:
@@ -300,9 +301,9 @@ async def test_drive_of_a_bundle_is_opened_by_its_expected_profile(
     remembered = "tui.session.diagnosis.asking.profile_remembered"
     monkeypatch.setattr(remembered, lambda link, device: SimpleNamespace(id=f"{link}-{device}"))
     opened = cast(Any, "opened")
-    named = bundle._subject(Target("L", 1, "atv71"), (4,), opened, None)
+    named: Any = bundle._subject(Target("L", 1, "atv71"), (4,), opened, None)
     assert await named.open_drive(4) == "session"
-    known = bundle._subject(Target("L", 1, None), (4,), opened, cast(Any, "link"))
+    known: Any = bundle._subject(Target("L", 1, None), (4,), opened, cast(Any, "link"))
     assert await known.open_drive(5) == "session"
     assert [(item.device, item.profile_id) for item in given] == [
         (4, None), (4, "atv71"), (5, None), (5, "link-5"),

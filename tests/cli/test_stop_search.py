@@ -84,7 +84,7 @@ async def test_silent_addresses_are_asked_again_after_all_others(
 async def test_usual_addresses_are_searched_on_an_unknown_line(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    silent = {f"d{device}": [None, None] for device in range(1, 11)}
+    silent: dict[str, Any] = {f"d{device}": [None, None] for device in range(1, 11)}
     stops = Stops(monkeypatch, **{**silent, "d4": [LineLost("Damaged."), FOUND], "d7": [FOUND]})
     stops.status = 4
     assert await stops.all([]) == 4
