@@ -69,7 +69,7 @@ class Stops:
 FOUND = True
 
 
-async def test_silent_addresses_are_asked_again_after_all_others(
+async def test_silent_addresses_are_tried_again_after_all_others(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     stops = Stops(monkeypatch, d1=[None, FOUND], d2=[FOUND], d3=[LineLost("Cut."), None])
