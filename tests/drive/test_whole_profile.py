@@ -19,6 +19,7 @@ from tui.drive.errors import ProfileError
 from tui.drive.profile import check, library
 from tui.drive.profile.converting import converted
 from tui.drive.profile.rules import CHECKED_RULES
+from tui.drive.profile.rules.names import named_parameters
 from tui.drive.profile.schema import ProfileData
 from tui.drive.profile.shared_rows import ProfileTables
 from tui.drive.profile.toml_lines import TomlPath
@@ -108,3 +109,51 @@ def test_error_of_a_profile_names_ten_faults_and_counts_the_others(tmp_path: Pat
             ": parameters.#1.access (STAT): 'x' is not an allowed value. Allowed: r, rw,"
             " rw-stopped, w."
         )
+
+
+def at_path(data: Any, path: TomlPath) -> Any:
+    """What a profile holds at a place."""
+    for step in path:
+        data = data[step] if isinstance(data, list | tuple | dict) else getattr(data, str(step))
+    return data
+
+
+def texts_at(node: Any, path: TomlPath = ()) -> Iterator[tuple[TomlPath, str]]:
+    """All texts of a profile, with their places."""
+    match node:
+        case msgspec.Struct():
+            node = {name: getattr(node, name) for name in node.__struct_fields__}
+        case list() | tuple():
+            node = dict(enumerate(node))
+    if isinstance(node, dict):
+        for step, part in node.items():
+            yield from texts_at(part, (*path, step))
+    elif isinstance(node, str):
+        yield path, node
+
+
+@pytest.mark.parametrize("name", ["whole", "atv21"])
+def test_each_place_that_names_a_parameter_holds_its_code(name: str) -> None:
+    profile = library.load_file(WHOLE) if name == "whole" else library.load(name)
+    named = dict(named_parameters(profile.data))
+    for place, code in named.items():
+        held = dict(texts_at(at_path(profile.data, place)))
+        assert (code or "") in (held.values() if held else [""]), (place, code)
+
+
+def test_each_place_that_holds_a_code_is_checked() -> None:
+    """But for the code of a parameter itself, texts, and the help for faults."""
+    data = library.load_file(WHOLE).data
+    named = dict(named_parameters(data))
+    codes = {parameter.code for parameter in data.parameters}
+    left = {
+        ".".join(map(str, place))
+        for place, text in texts_at(data)
+        if text in codes and not any(place[:length] in named for length in range(len(place) + 1))
+    }
+    own = {f"parameters.{index}.code" for index in range(len(data.parameters))}
+    assert left - own == {
+        "faults.help.0.look_at.0.code",
+        "faults.help.0.supported.0.parameter",
+        "signal_paths.0.switches.0.name",
+    }
