@@ -116,5 +116,8 @@ EQUIVALENT: dict[str, str] = {
     "tui/session/monitor/line_watch.py:LineWatch._last_seen: constant: 0.0 -> 1.0": (
         "The time counts from the start of the computer: no cycle ends in its first second."
     ),
+    'tui/drive/profile/heads.py:_read_tables: call: section(text, "functions") -> None': (
+        "It saves time only: the whole file is read then, and has the same tables."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

@@ -114,7 +114,8 @@ def test_error_of_a_profile_names_ten_faults_and_counts_the_others(tmp_path: Pat
 def at_path(data: Any, path: TomlPath) -> Any:
     """What a profile holds at a place."""
     for step in path:
-        data = data[step] if isinstance(data, list | tuple | dict) else getattr(data, str(step))
+        is_row = not isinstance(data, msgspec.Struct)
+        data = data[step] if is_row else getattr(data, str(step))
     return data
 
 
