@@ -131,6 +131,7 @@ def test_read_is_answered_by_words_that_are_recent_enough(
     if answered:
         reply = job.answer.result(0)
         assert (reply.words, reply.time) == ((2, 3), 500.0)
+    assert job.begun is (begun or answered)
 
 
 def found(values: SharedValues, request: Request) -> tuple[int, ...] | None:

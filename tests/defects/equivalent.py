@@ -119,5 +119,13 @@ EQUIVALENT: dict[str, str] = {
     'tui/drive/profile/heads.py:_read_tables: call: section(text, "functions") -> None': (
         "It saves time only: the whole file is read then, and has the same tables."
     ),
+    "tui/bus/schedule/alive_reads.py:AliveReads.__init__: constant: 0.0 -> 1.0": (
+        "The first look has seen nothing before, and so it looks whatever is due."
+    ),
+    "tui/bus/schedule/pace.py:Pace.claim: argument: greatest(self.own, self.others) ->"
+    " greatest(self.others, self.own)": ("The greatest wish is the same in either order."),
+    "tui/bus/schedule/queue.py:SentStops.__init__: constant: False -> True": (
+        "A stop yields only if the same one was counted, and a count sets it."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

@@ -112,7 +112,7 @@ def test_error_of_a_profile_names_ten_faults_and_counts_the_others(tmp_path: Pat
 
 
 def at_path(data: Any, path: TomlPath) -> Any:
-    """What a profile holds at a place."""
+    """The content of a profile at a place."""
     for step in path:
         is_row = not isinstance(data, msgspec.Struct)
         data = data[step] if is_row else getattr(data, str(step))

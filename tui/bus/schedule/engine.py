@@ -252,7 +252,6 @@ class Engine:
 
     def _work(self, loop: asyncio.AbstractEventLoop) -> None:
         """The thread: run the loop until closed, then leave nothing behind."""
-        asyncio.set_event_loop(loop)
         try:
             self._main = loop.create_task(self._connection.run())
             loop.run_until_complete(self._main)
@@ -264,7 +263,6 @@ class Engine:
                 self._closed = True
             loop.run_until_complete(self._end())
             loop.close()
-            asyncio.set_event_loop(None)
             self._changed(LineState(LineStatus.CLOSED, "", self._clock()))
 
     async def _end(self) -> None:
