@@ -6,13 +6,18 @@ import asyncio
 import itertools
 import os
 import socket
+from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+from unittest.mock import Mock
 
 import pytest
 
 from tests.limits import BEAT_INTERVAL, LOOP_HANGS, SILENT_CLIENT
 from tests.line_events import on_event
 from tui.bus.line_events import ProgramLost
+from tui.bus.share import heartbeat as heartbeats
 from tui.bus.share.heartbeat import Heartbeat
 from tui.bus.share.messages import Alive, Pulse, packed
 from tui.bus.share.place import Peer, owner_of, short_path
@@ -117,3 +122,79 @@ def _sends(path: str, program: str) -> bool:
             return False
         except OSError:
             return True
+
+
+class Beats:
+    """A heartbeat whose thread is run step by step, and what it sends."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now = 100.0
+        self.did: list[tuple[object, ...]] = []
+        self.refused = self.broken = False
+        self.steps: list[Callable[[], object]] = []
+        self.works: list[Callable[[], None]] = []
+        event = SimpleNamespace(is_set=lambda: not self.steps, wait=self._wait, set=Mock())
+        threads = SimpleNamespace(Event=lambda: event, Thread=self._thread)
+        monkeypatch.setattr(heartbeats, "threading", threads)
+        monkeypatch.setattr(heartbeats, "monotonic", lambda: self.now)
+        monkeypatch.setattr(heartbeats, "reached", self._reached)
+        self.it = Heartbeat("/run/line", "me")
+        self.it.close()
+        event.set.assert_called_once_with()
+
+    def _thread(self, target: Any, name: str, daemon: bool) -> Any:
+        assert (name, daemon) == ("heartbeat", True)
+        return SimpleNamespace(start=lambda: self.works.append(target))
+
+    def _wait(self, seconds: float) -> None:
+        assert seconds == BEAT_INTERVAL
+        self.now += seconds
+        self.steps.pop(0)()
+
+    def _reached(self, path: Path, within: float) -> Any:
+        self.did.append(("connect", str(path), within))
+        if self.refused:
+            raise ConnectionRefusedError
+        return SimpleNamespace(sendall=self._send, close=lambda: self.did.append(("close",)))
+
+    def _send(self, data: bytes) -> None:
+        if self.broken:
+            raise BrokenPipeError
+        self.did.append((data,))
+
+    def run(self, *steps: Callable[[], object]) -> list[tuple[object, ...]]:
+        """Beat before each step; return what was done."""
+        self.steps += steps
+        [work] = self.works
+        work()
+        found, self.did = self.did, []
+        return found
+
+
+def test_heartbeat_greets_on_each_connection_and_rests_while_the_loop_hangs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    beats = Beats(monkeypatch)
+    connect, greeting = ("connect", "/run/line", 0.5), (packed(Pulse("me")),)
+    alive, close = (packed(Alive()),), ("close",)
+
+    def nothing() -> None:
+        pass
+
+    def hang() -> None:
+        beats.now += LOOP_HANGS
+
+    assert beats.run(nothing, nothing, nothing) == [connect, greeting, alive, alive, close]
+    beats.it.turn()
+    assert beats.run(nothing, hang, nothing, beats.it.turn, nothing) == [
+        connect, greeting, alive, alive, close
+    ]  # fmt: skip
+    beats.it.turn()
+    breaks = lambda: setattr(beats, "broken", True)  # noqa: E731
+    heals = lambda: setattr(beats, "broken", False)  # noqa: E731
+    assert beats.run(breaks, heals, nothing) == [
+        connect, greeting, close, connect, greeting, close
+    ]  # fmt: skip
+    beats.it.turn()
+    beats.refused = True
+    assert beats.run(nothing, nothing) == [connect, connect]

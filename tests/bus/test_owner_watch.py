@@ -203,6 +203,10 @@ def test_keeper_may_be_silent_for_exactly_its_time() -> None:
     bench.now += 0.125
     bench.watch.look(attached=True)
     assert len(bench.process.kills) == 1
+    for remedy in (*[False] * 8, True):  # for a second it may be ending
+        bench.now += 0.125
+        bench.watch.look(attached=True)
+        assert bool(bench.watch.remedy) is remedy
 
 
 @pytest.mark.internal_errors

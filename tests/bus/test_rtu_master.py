@@ -247,6 +247,17 @@ async def test_reply_that_began_before_the_end_of_its_request_belongs_to_another
     assert not master._came_too_early(ExchangeResult(kind, pdu), time)
 
 
+async def test_reply_may_begin_before_the_end_of_its_request_by_the_tolerance(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tui.bus.rtu.master.TOLERANCE", 0.125)
+    for begins, early in ((0.125, False), (0.1875, True)):
+        master = replies(*[False] * 50)
+        master._character = 0.0
+        result = ExchangeResult(ResultKind.REPLY, bytes([3, 2, 0, 7]))
+        assert master._came_too_early(result, master._sent - begins) is early
+
+
 def test_gap_over_tcp_is_longer_than_on_a_port() -> None:
     tcp = RtuTcpLink("127.0.0.1", 1)
     timing = Timing()
