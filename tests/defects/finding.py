@@ -31,8 +31,8 @@ DEFECTS = (
     Defect(
         "late-echo-taken-for-a-master",
         "tui/session/connect/other_masters.py",
-        "elif frame.time < since or frame.data in ours:",
-        "elif frame.time < since:",
+        "elif frame.time <= since or frame.data in ours:",
+        "elif frame.time <= since:",
         "With an adapter that echoes late, no drive is ever found.",
         (f"{MASTERS}::test_own_or_damaged_frames_show_no_master",),
     ),
