@@ -11,11 +11,13 @@ from itertools import product
 from pathlib import Path
 
 import pytest
+from msgspec import structs
 
 from tests.drive.test_whole_values import HELD, OTHER, whole
 from tests.recorded import result, sections, short
 from tui.drive.blocks import assignment, file, picking, slot_rules, user_words, wire_cost
 from tui.drive.profile.csv_file import profile_from_table
+from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.settings import recipes, replacement, set_file
 from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
@@ -153,6 +155,22 @@ def blocks() -> Iterator[str]:
     for text in ("hex", "signed", "x"):
         yield f"{text}: {result(user_words.format_named, text)}"
     yield f"{short(wire_cost.stretches(profile, ['FOUT', 'CORR', 'TRIP', 'LOW'], timing))}"
+    for held in ({"SLT1": 0x10065, "SLT2": 228, "FOUT": 3}, {"SLT1": 101}):
+        yield f"{held}: {short(assignment.assignment(block, held))}"
+    other = assignment.Assignment(block, (1, 2))
+    yield f"{[other.moved(place, step).raws for place in (-1, 0, 1, 2) for step in (-1, 0, 1)]}"
+    yield f"{assignment.has_blocks(profile)} {short(assignment.empty(block))}"
+    yield f"{short(assignment.factory(profile, block))} {assignment.describe(profile, block, None)}"
+    for slot in ("SLT1", " slt2 ", "SLT3", ""):
+        yield f"{slot!r}: {result(assignment.place_of, profile, slot)}"
+    yield assignment.no_blocks(profile)
+    for most in (1, 2):
+        functions = [
+            structs.replace(function, max_read=most) for function in profile.data.functions
+        ]
+        data = structs.replace(profile.data, functions=functions, blocks=[])
+        yield f"{most}: {assignment.no_blocks(Profile(data))}"
+        yield f"  {result(assignment.place_of, Profile(data), 'SLT1')}"
     text = file.dump_blocks(profile, [plans[1]], "a note")
     yield text
     for old, new in (("", ""), ('"FOUT"', '"GONE"'), ('"FOUT"', "70000"), ('"FOUT"', "true"),
