@@ -20,6 +20,7 @@ from tests.limits import ALARM_AFTER
 from tui.bus.api import Priority
 from tui.bus.line import Line
 from tui.bus.link import SerialLink
+from tui.bus.model import LineStatus
 from tui.bus.program import KEEPER, Program, pid_namespace
 from tui.bus.share import keeper_share, keeping, sharing
 from tui.bus.share.keeper_share import PROCESS_ENDS_WITHIN, KeeperShare, Keeping
@@ -197,3 +198,22 @@ def test_keeper_finds_this_package_and_the_folders_of_this_program(
         **({} if found is None else {"PYTHONPATH": found}),
     }  # fmt: skip
     assert environment["DRIVEPANEL_STATE"] == "state", "its own is not changed"
+
+
+async def test_program_that_attaches_ends_the_wait_for_a_lost_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(sharing, "OwnerLock", Mock())
+    inside: Any = Mock()
+    inside.state.return_value.status = LineStatus.LOST
+    inside.dispatcher.proof.repeats_wait = False
+    keep = Keeping(3, (), lambda: None, lambda: True, lambda _: None)
+    share = KeeperShare(keep, SharePlace("usb7", Path("/locks"), ()), inside)
+    waiting = asyncio.ensure_future(share.pause(60.0))
+    await asyncio.sleep(0)
+    share.moved(arrived=False)
+    for _ in range(5):
+        await asyncio.sleep(0)
+    assert not waiting.done(), "one that leaves does not end it"
+    share.moved(arrived=True)
+    await asyncio.wait_for(waiting, 10.0)
