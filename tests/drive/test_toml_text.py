@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 import tomli
@@ -70,3 +71,22 @@ def test_row_with_an_invalid_name_is_reported(key: str, odd: str, tmp_path: Path
     faults = library.all_faults_of(path)
     assert faults
     assert all(str(path) in fault for fault in faults)
+
+
+@pytest.mark.parametrize(
+    ("error", "text"),
+    [
+        (RecursionError(), "Tables or lists are nested too deep (at line 1, column 1)"),
+        (
+            ValueError("year 0 is out of range; more"),
+            "year 0 is out of range (at line 1, column 1)",
+        ),
+    ],
+)
+def test_error_of_the_parser_has_a_place(
+    error: Exception, text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.drive.toml_text.tomli.loads", Mock(side_effect=error))
+    with pytest.raises(tomli.TOMLDecodeError) as refused:
+        toml_tables("a = 1\n")
+    assert str(refused.value) == text
