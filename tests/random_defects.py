@@ -25,7 +25,7 @@ import pytest
 
 from tests import reached
 from tests.defects.equivalent import EQUIVALENT
-from tests.forked import LONGEST, Forks
+from tests.forked import HUNG, LONGEST, Forks
 from tests.mutants import SURVIVED, copies, dealt, replaced, run_tests
 from tests.mutator import Defaults, Mutant, Mutator, Site
 from tests.sources import PACKAGE, ROOT, modules, tree_of
@@ -435,7 +435,7 @@ class Judge:
         self._tests = {
             mutant: (chooser.tests(mutant), chooser.runs_at_import(mutant)) for mutant in mutants
         }
-        self._passes: dict[str, bool] = {}
+        self._passes: set[str] = set()
 
     def judge(self, mutant: Mutant, copy: Path) -> Judged:
         """Plant a defect in a copy and run the tests that reach it."""
@@ -481,7 +481,7 @@ class Judge:
     def _search(self, parts: list[list[str]], run: Callable[[list[str], bool], str]) -> str:
         """The first test that fails twice with the defect and passes without it; else empty."""
         for tests in parts:
-            while tests and (failed := run(tests, True)):
+            while tests and (failed := _first_failure_of(tests, run)):
                 if run([failed], True) and self._passes_without(failed, run):
                     return failed
                 # it may be one of a file, or of a function with parameters, that was chosen
@@ -490,9 +490,16 @@ class Judge:
         return ""
 
     def _passes_without(self, test: str, run: Callable[[list[str], bool], str]) -> bool:
-        if test not in self._passes:
-            self._passes[test] = not run([test], False)
-        return self._passes[test]
+        # a failure may be of a busy computer, and is tried again for the next defect
+        if test not in self._passes and not run([test], False):
+            self._passes.add(test)
+        return test in self._passes
+
+
+def _first_failure_of(tests: list[str], run: Callable[[list[str], bool], str]) -> str:
+    """The first test that fails; on a busy computer a fork may hang before it, and runs again."""
+    failed = run(tests, True)
+    return run(tests, True) if failed == HUNG else failed
 
 
 def _is_of(test: str, name: str) -> bool:
