@@ -209,8 +209,8 @@ class Forks:
     ) -> Result:  # fmt: skip
         """Run tests in a fork until one fails, with a source of a file instead of another.
 
-        If that ends the process that forks, which a defect can do, another one begins, and no test
-        counts as failed.
+        If that ends the process that forks, which a defect can do, another one begins, and the
+        fork counts as hung before its first test.
         """
         request = {
             "tests": tests, "path": path, "before": before, "after": after, "seconds": seconds,
@@ -221,7 +221,7 @@ class Forks:
             return Result(*json.loads(answer))
         self.close()
         self._begin()
-        return Result("")
+        return Result(HUNG)
 
     def _await_ready(self) -> None:
         """Wait until the tests are collected; several processes may begin at the same time."""
