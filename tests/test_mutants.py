@@ -256,17 +256,17 @@ def test_report_counts_defects_that_no_test_reaches_as_missed() -> None:
 
 def test_failure_of_a_busy_computer_disqualifies_no_test_for_good() -> None:
     runs = iter(("hung", "a", "a", "a", "", "a", "a", ""))
-    asked: list[tuple[str, ...]] = []
+    requested: list[tuple[str, ...]] = []
 
     def run(tests: list[str], defective: bool) -> str:
-        asked.append((*tests, "with" if defective else "without"))
+        requested.append((*tests, "with" if defective else "without"))
         return next(runs)
 
     judged = Judge(cast(Chooser, None), (), {})
     # a fork hangs before its first test and runs again; then `a` fails without the defect, too
     assert judged._search([["a", "b"]], run) == ""
     assert judged._search([["a"]], run) == "a"
-    assert asked == [
+    assert requested == [
         ("a", "b", "with"), ("a", "b", "with"), ("a", "with"), ("a", "without"), ("b", "with"),
         ("a", "with"), ("a", "with"), ("a", "without"),
     ]  # fmt: skip
