@@ -37,6 +37,8 @@ from .commands import refused
         (["sim:atv71", "sim:atv71"], "named twice"),
         (["sim:atv71", "-d", "1", "-p", "atv71"], "require --tcp, --metrics or --mqtt"),
         (["sim:atv71", "--every", "2"], "requires --metrics or --mqtt"),
+        (["sim:atv71", "--mqtt-password-file", __file__], "requires --mqtt."),
+        (["sim:atv71", "--metrics", ":1", "--mqtt-password-file", __file__], "requires --mqtt."),
         (["sim:atv71", "--metrics", "here"], "write HOST:PORT"),
         (["tcp:10.0.0.1", "sim:atv71", "--metrics", ":1", "-d", "1", "-p", "atv71"], "which line"),
     ],
