@@ -28,7 +28,7 @@ from tui.screens.control import switch_view
 from tui.screens.control import view as control
 from tui.screens.faults.doctor import doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
-from tui.screens.faults.view import record_lines, stored_lines
+from tui.screens.faults.view import history_rows, record_lines, stored_lines
 from tui.screens.monitor.arrange import arrange
 from tui.screens.monitor.assembly import monitor_parts, other_values, tables, watched_words
 from tui.screens.monitor.run_line import RunLine, proposed, run_lines
@@ -335,6 +335,10 @@ def doctor_views() -> Iterator[tuple[str, DoctorView]]:
     yield "changed", replace(usual, changed=frozenset({"DEC"}), monitored=readings, raws=read)
     for raw in (1, 3, 9, 20, 22):
         yield f"fault {raw}", replace(usual, fault=atv71.fault(raw), record=None, armed=True)
+    external = next(fault for fault in atv71.data.faults.codes if fault.code == "EPF1")
+    inputs = {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}
+    seen = fakes.readings_of(atv71, inputs, fakes.NOW - 3)
+    yield "inputs", replace(usual, fault=external, record=None, readings=seen)
     yield "no number", replace(usual, fault=None, record=None)
     alarms = [("LRS6", 8, "Undervoltage alarm"), ("LRS6", 11, "Drive thermal alarm")]
     yield "alarm", replace(usual, fault=None, record=None, present=False, alarms=alarms)
@@ -360,6 +364,9 @@ def faults() -> Iterator[str]:
         for size in ((60, 11), (80, 19), (80, 40), (120, 35), (200, 55)):
             yield from pages.page(f"{name} {size}", doctor_lines(view, *size))
         yield f"{name}: {view.rows} {view.stored_place} {view.advice}"
+        if name in ("trip", "at 14", "at 40", "quiet", "atv21"):
+            for width, height in ((60, 9), (90, 3), (130, 12)):
+                yield from pages.page(f"{name} {width}", history_rows(view, width, height))
     record, atv71 = test_command_pictures.trip(), library.load("atv71")
     readings = fakes.readings_of(atv71, fakes.STORED, fakes.NOW)
     for width, height, offset in ((60, 9, 0), (80, 20, 4), (120, 30, 0)):
