@@ -127,5 +127,43 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/schedule/queue.py:SentStops.__init__: constant: False -> True": (
         "A stop yields only if the same one was counted, and a count sets it."
     ),
+    "tui/screens/trend/contents.py:mark_places: constant: 0 -> 1": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/contents.py:mark_places: constant: 1 -> 10": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/contents.py:mark_places: constant: 1 -> 2": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/axis.py:tick_columns: constant: 0 -> 1": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/axis.py:tick_columns: constant: 1 -> 10": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/axis.py:tick_columns: constant: 1 -> 2": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/axis.py:trend_axis: constant: 0 -> 1": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/axis.py:trend_axis: constant: 1 -> 10": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/axis.py:trend_axis: constant: 1 -> 2": (
+        "Only columns are taken from this plot, and its scale is for rows."
+    ),
+    "tui/screens/trend/axis.py:tick_columns: constant: 1 -> 10 #2": (
+        "A tick after the page has no column."
+    ),
+    "tui/screens/trend/axis.py:tick_columns: constant: 1 -> 2 #2": (
+        "A tick after the page has no column."
+    ),
+    "tui/screens/monitor/assembly.py:motor_lines: constant: True -> False #2": (
+        "Each value has a label."
+    ),
+    "tui/screens/monitor/assembly.py:motor_lines: argument: zip(values, labels, strict=True) ->"
+    " zip(values, labels)": ("Each value has a label."),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""

@@ -153,6 +153,10 @@ def trend() -> Iterator[str]:
             yield from pages.page(
                 f"{name} {count} {width}x{height}", trend_rows(view, width, height)
             )
+            for cells in (table.NARROW - 1, table.NARROW, table.WIDE - 1, table.WIDE):
+                shown = [each.row for each in bands]
+                lines = table.value_table(shown, cells, present=count > 1)
+                yield from pages.page(f"{name} table {cells}", lines)
     yield from pages.page(
         "none", trend_rows(TrendView([], 0, TrendPage(), now, 0, [], None), 80, 20)
     )
