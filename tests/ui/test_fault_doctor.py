@@ -15,7 +15,7 @@ from tui.drive.profile import library
 from tui.drive.sentences import capitalized
 from tui.screens.faults.doctor import EXCLUDED, LIKELIEST, OPEN, TOO_FEW, UNDECIDED, doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
-from tui.screens.faults.next_steps import ARM, BESIDE_KEY
+from tui.screens.faults.next_steps import ARM, BESIDE_KEY, open_row
 from tui.screens.faults.parts import LABEL
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.faults.view import history_rows, record_lines
@@ -520,3 +520,24 @@ def test_fault_without_a_time_says_if_it_is_present() -> None:
     present = reported(view(18))
     assert "tripped before monitoring began" in present
     assert "no longer present" not in present
+
+
+@pytest.mark.parametrize(
+    ("raw", "at", "text"),
+    [
+        (5, 1, "Open SLL Reaction to a Modbus fault: Freewheel, factory setting Freewheel."),
+        (8, 1, "Open LET Level of the external fault: Active at 1, factory setting Active at 1."),
+        (2, 0, "Open VDP Software version."),
+    ],
+)
+def test_row_of_enter_has_the_factory_setting_as_soon_as_there_is_room(
+    raw: int, at: int, text: str
+) -> None:
+    read = readings_of(ATV71, {"SLL": 1, "LET": 1}, NOW)
+    shown = view(raw, readings=read, now=NOW, cursor=at)
+    named = text.partition(":")[0].rstrip(".") + "."
+    assert open_row(replace(shown, cursor=len(shown.rows)), 80) == []
+    for width in range(len(named) + 10, len(text) + 30):
+        (row,) = open_row(shown, width)
+        fits = len(text) < width - len("  Enter  ")
+        assert row.plain.rstrip() == f"  Enter  {text if fits else named}", width

@@ -166,7 +166,7 @@ def _rows(cause: WeighedCause, first: bool, aligned: int, width: int) -> list[Te
     if cause.verdict == "open":
         return [text]
     parts = wrapped(reason, width - SIGN_WIDTH - 2, 2)
-    below = [Text(f"{' ' * (SIGN_WIDTH + 2)}{part}", PLAIN, no_wrap=True) for part in parts]
+    below = [Text(f"{' ' * (SIGN_WIDTH + 2)}{part}", PLAIN) for part in parts]
     return [text, *below]
 
 
