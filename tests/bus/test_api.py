@@ -313,6 +313,16 @@ async def test_fake_read_fails_as_often_as_set_and_at_its_address_only(line: Fak
     await line.write(THERE, 103, [1])
 
 
+async def test_fake_write_fails_only_if_it_writes_the_register(line: FakeLine) -> None:
+    line.fail_write(THERE, 102, 4)
+    await line.write(THERE, 101, [1])
+    await line.write(THERE, 103, [1, 1])
+    await line.write(THERE, 100, [1, 1])
+    for first, values in ((102, [1]), (100, [1, 1, 1]), (102, [1, 1])):
+        with pytest.raises(DeviceException):
+            await line.write(THERE, first, values)
+
+
 @pytest.mark.parametrize("taken", [False, True])
 async def test_write_without_a_reply_has_an_unknown_outcome(line: FakeLine, taken: bool) -> None:
     line.fail_write(THERE, None, NoAnswer(THERE, 6, 100), times=1, taken=taken)

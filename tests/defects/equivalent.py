@@ -160,6 +160,10 @@ EQUIVALENT: dict[str, str] = {
     "tui/screens/trend/axis.py:tick_columns: constant: 1 -> 2 #2": (
         "A tick after the page has no column."
     ),
+    "tui/bus/transport/serial_posix.py:PosixSerial.__init__: argument:"
+    " os.set_blocking(port.fileno(), False) -> os.set_blocking(False, port.fileno())": (
+        "pyserial has opened the port without blocking."
+    ),
     "tui/screens/monitor/assembly.py:motor_lines: constant: True -> False #2": (
         "Each value has a label."
     ),

@@ -41,6 +41,7 @@ SET_DAMAGES = (
     ('value = "Modbus"', 'value = "Bus"'), ("raw = 1, value = \"Modbus\"", 'value = "Bus"'),
     ("raw = 48, value = \"4.8 A\"", 'value = "4.83 A"'), ("INCR = {", "# {"),
     ("device = 7", 'device = "7"'), ("[identity]", "[identity"), ("ACCE = {", "ACCE = 3 # {"),
+    ("[parameters.Settings]", "[parameters]\nSettings = 3\n[parameters.Other]"),
 )  # fmt: skip
 TABLE = """code;name;number;address;type;unit;scale;min;max;factory;values;access;quantity;function
 P1;Ramp;10;9001;uint16;s;0,1;0,1;999.9;3;;rw;acceleration;

@@ -14,6 +14,7 @@ from tui.drive.channel import Channel
 from tui.drive.orders import choose, stop_in_any
 from tui.drive.profile import library
 from tui.session.command import last_known, motor_stop
+from tui.session.command.first_stop import ONE_WORD
 from tui.session.command.last_known import run_by_others
 from tui.session.command.motor_stop import FirstWave, MotorStop
 from tui.session.command.stop_report import Phase, not_proved, not_stopped
@@ -216,6 +217,7 @@ async def test_drive_of_unlike_families_is_sent_the_word_that_stops_them_all(
 
     async def first(*of: object) -> Any:
         calls.append(of)
+        here.drive.describe(1, ONE_WORD)
         return SimpleNamespace(sent=(1,) * sent, taken=taken, answered=answered)
 
     monkeypatch.setattr(motor_stop, "unlike_families", lambda _: FAMILIES)
@@ -237,6 +239,7 @@ async def test_drive_of_unlike_families_that_fails_does_not_hold_up_the_others(
     here = OneStop(Ramp(OwnTime(), 0.0), journal, wave=wave)
 
     async def first(*_: object) -> None:
+        here.drive.describe(1, ONE_WORD)
         raise NoAnswer(1, 3, 1)
 
     monkeypatch.setattr(motor_stop, "unlike_families", lambda _: FAMILIES)

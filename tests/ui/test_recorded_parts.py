@@ -209,6 +209,8 @@ def lists_of_parameters() -> Iterator[str]:
         for to in (1, -1):
             listed.end(to)
             yield now(to)
+            listed.move_to(-5 * to, -to)  # beyond the last row, which may be a heading
+            yield now(to)
     for step in (1,) * 14 + (-1,) * 4:
         listed.group(editor, step)
         listed.fill(editor, "")
