@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import pytest
 
 from tests.sweeps import kept
+from tui.drive.control_source import SourceChange, source_changes
+from tui.session.command import commander
 from tui.session.work import OutcomeKind
 
 from .test_command import ALTIVARS, bench
@@ -29,6 +33,23 @@ async def test_only_differing_values_are_written() -> None:
         assert "FR2, RFC" in await made.done()
         made.commander.configure(source)
         assert "no change was necessary" in await made.done()
+
+
+async def test_settings_that_the_drive_changes_again_are_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with bench("atv71") as made:
+        source = made.session.profile.data.control_sources[1]
+        found: list[list[SourceChange]] = []
+
+        def changes(*of: Any) -> list[SourceChange]:
+            found.append(source_changes(*of))
+            return found[-1] if len(found) <= len(source.settings) else found[0]
+
+        monkeypatch.setattr(commander, "source_changes", changes)
+        made.commander.configure(source)
+        told = await made.done(OutcomeKind.REFUSED)
+        assert told.endswith(f"{source.name}: the drive has changed FR2, RFC again.")
 
 
 async def test_control_source_is_not_changed_while_the_motor_turns() -> None:
