@@ -21,6 +21,7 @@ from tests.cli.test_documents import DRIVE, RUNS, make_files
 from tests.recorded import AFTER_A_CHANGE, sections
 from tests.sources import ROOT
 from tests.sweeps import kept
+from tui.session.connect.open_line import open_line
 
 TEXTS = Path(__file__).parent / "recorded_outputs.txt"
 KEYS = "time|seconds|begun|ended|at|age|ms|since|until|pid|load|share|size|bytes"
@@ -73,6 +74,8 @@ BY_NAME = {
 """By the name of a section: the words of each run."""
 QUICK = {"compare", "identify", "journal", "lines", "plan", "status", "stop", "write"}
 """Commands of the main layer; the others are for the sweeps."""
+HOW_OPENED = "read_only", "wait", "program", "keeper"
+"""How a line was opened: a command that only looks cannot write to it."""
 LONGEST = 6000
 """Characters that are recorded of a text; the rest is represented by a checksum of all."""
 READ = {".toml", ".md", ".json", ".html", ".csv"}
@@ -96,8 +99,16 @@ def printed(words: tuple[str, ...], *options: str) -> Iterator[str]:
         patch.chdir(parent)  # columns are as wide as the names of files in them
         for name in ("STATE", "CONFIG"):
             patch.setenv(f"DRIVEPANEL_{name}", f"{parent}/{name.lower()}")
+        opened: list[str] = []
+
+        def noted(text: str, **how: object) -> object:
+            opened.append(", ".join(f"{name} {how[name]}" for name in HOW_OPENED if name in how))
+            return open_line(text, **how)  # type: ignore[arg-type]
+
+        patch.setattr("tui.session.connect.open_line.open_line", noted)
         done = invoked(*(word.replace("FOLDER", folder.name) for word in words), *options)
         found = [f"$ {' '.join((*words, *options))}", done.output.rstrip(), f"-> {done.exit_code}"]
+        found += [f"opened: {how}" for how in dict.fromkeys(opened)]
         for path in sorted(folder.glob("new*")):
             found += [f"{path.name}:", path.read_text("utf-8")] if path.suffix in READ else ()
     text = "\n".join(found).replace(parent, "F").replace(str(ROOT), "ROOT")
