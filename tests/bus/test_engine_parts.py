@@ -95,6 +95,21 @@ def test_worker_of_a_line_that_is_closed_is_abandoned() -> None:
         engine.spawn("work", "w")
 
 
+def test_thread_leaves_the_line_closed_however_it_ends() -> None:
+    async def nothing() -> None:
+        """End at once."""
+
+    engine, loop, said = an_engine(), asyncio.new_event_loop(), Mock()
+    engine._connection = SimpleNamespace(run=nothing)
+    engine._end, engine._changed, engine._clock = nothing, said, lambda: 3.0
+    engine._work(loop)
+    assert loop.is_closed()
+    assert said.mock_calls == [call(LineState(LineStatus.CLOSED, "", 3.0))]
+    assert not engine._accepting
+    with pytest.raises(LineClosed):
+        engine.start(None)
+
+
 @pytest.mark.internal_errors
 def test_internal_error_reaches_the_caller_that_waits(caplog: pytest.LogCaptureFixture) -> None:
     error, given = ValueError("on purpose"), Mock()

@@ -5,13 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 from textual.widgets import Input, OptionList
 
 from tests.sweeps import kept
 from tui.drive.blocks.wire_cost import Cost, Saving
+from tui.drive.profile import library
 from tui.drive.settings.writable import AT_REST
+from tui.screens.blocks.block_keys import BlockKeys
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.blocks.view import cost_lines, table_lines
 from tui.screens.connection.screen import ConnectionScreen
@@ -362,3 +366,17 @@ async def test_list_for_a_slot_begins_with_monitored_values_that_no_slot_maps() 
         await until(made.pilot, lambda: isinstance(made.app.screen, PickParameter))
         again = made.app.screen.query_one(OptionList)
         assert "LCR" not in [str(o.prompt).split()[0] for o in again.options][:first]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "0 hex, 0 hex, 0 hex, 0 hex"),
+        ("LCR signed, W7121, none", "3204 signed, 7121 hex, 0 hex, 0 hex"),
+        ("3204, ETA bits, LCR, LCR, LCR", "3204 hex, 3201 bits, 3204 hex, 3204 hex"),
+    ],
+)
+def test_typed_user_words_are_hexadecimal_unless_said(text: str, words: str) -> None:
+    screen: Any = SimpleNamespace(session=SimpleNamespace(profile=library.load("atv71")))
+    found = BlockKeys._words_typed(screen, text)
+    assert ", ".join(f"{word.address} {word.format}" for word in found) == words
