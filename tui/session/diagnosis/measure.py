@@ -123,7 +123,7 @@ def measure_of(
             ours = body[:1] == bytes([device]) and not (echoes and body[1] == DIAGNOSE)
             if ours:
                 exchanges.append(_Exchange(body, frame.time, frame.data[: TRANSACTION_BYTES * tcp]))
-        elif not ours or len(body) < 2 or _is_echo(frame, body, exchanges[-1]):
+        elif not ours or (tcp and len(body) < 2) or _is_echo(frame, body, exchanges[-1]):
             continue
         elif not tcp and not is_whole(frame.data):
             _loose(found, exchanges[-1], frame)
