@@ -99,12 +99,12 @@ def test_thread_leaves_the_line_closed_however_it_ends() -> None:
     async def nothing() -> None:
         """End at once."""
 
-    engine, loop, said = an_engine(), asyncio.new_event_loop(), Mock()
+    engine, loop, reported = an_engine(), asyncio.new_event_loop(), Mock()
     engine._connection = SimpleNamespace(run=nothing)
-    engine._end, engine._changed, engine._clock = nothing, said, lambda: 3.0
+    engine._end, engine._changed, engine._clock = nothing, reported, lambda: 3.0
     engine._work(loop)
     assert loop.is_closed()
-    assert said.mock_calls == [call(LineState(LineStatus.CLOSED, "", 3.0))]
+    assert reported.mock_calls == [call(LineState(LineStatus.CLOSED, "", 3.0))]
     assert not engine._accepting
     with pytest.raises(LineClosed):
         engine.start(None)

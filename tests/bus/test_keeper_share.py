@@ -176,7 +176,7 @@ def test_line_is_taken_from_a_keeper_that_ends(
         ("/opt/panel", "", "/opt/panel"),
         ("/opt/panel", "/a:/b", "/a:/b:/opt/panel"),
         ("/usr/lib/python3/dist-packages", "/a", "/a"),
-        ("/home/x/.venv/lib/site-packages", None, None),
+        ("/opt/x/.venv/lib/site-packages", None, None),
     ],
 )
 def test_keeper_finds_this_package_and_the_folders_of_this_program(

@@ -57,15 +57,15 @@ def test_reader_that_is_gone_is_reported_once_and_later_lines_are_dropped(
 ) -> None:
     os.close(ends[0])
     reports: list[str] = []
-    told = threading.Event()
+    reported = threading.Event()
 
     def gone() -> None:
         reports.append("gone")
-        told.set()
+        reported.set()
 
     output = BufferedOutput(gone)
     output.say("first")
-    assert told.wait(20)
+    assert reported.wait(20)
     output.say("second")
     output.finish()
     assert reports == ["gone"]

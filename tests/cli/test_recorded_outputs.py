@@ -75,7 +75,7 @@ BY_NAME = {
 QUICK = {"compare", "identify", "journal", "lines", "plan", "status", "stop", "write"}
 """Commands of the main layer; the others are for the sweeps."""
 HOW_OPENED = "read_only", "wait", "program", "keeper"
-"""How a line was opened: a command that only looks cannot write to it."""
+"""Arguments with which a line was opened: a command that only looks cannot write to it."""
 LONGEST = 6000
 """Characters that are recorded of a text; the rest is represented by a checksum of all."""
 READ = {".toml", ".md", ".json", ".html", ".csv"}

@@ -48,8 +48,8 @@ async def test_settings_that_the_drive_changes_again_are_named(
 
         monkeypatch.setattr(commander, "source_changes", changes)
         made.commander.configure(source)
-        told = await made.done(OutcomeKind.REFUSED)
-        assert told.endswith(f"{source.name}: the drive has changed FR2, RFC again.")
+        reported = await made.done(OutcomeKind.REFUSED)
+        assert reported.endswith(f"{source.name}: the drive has changed FR2, RFC again.")
 
 
 async def test_control_source_is_not_changed_while_the_motor_turns() -> None:

@@ -376,7 +376,7 @@ async def test_list_for_a_slot_begins_with_monitored_values_that_no_slot_maps() 
         ("3204, ETA bits, LCR, LCR, LCR", "3204 hex, 3201 bits, 3204 hex, 3204 hex"),
     ],
 )
-def test_typed_user_words_are_hexadecimal_unless_said(text: str, words: str) -> None:
+def test_typed_user_words_are_hexadecimal_by_default(text: str, words: str) -> None:
     screen: Any = SimpleNamespace(session=SimpleNamespace(profile=library.load("atv71")))
     found = BlockKeys._words_typed(screen, text)
     assert ", ".join(f"{word.address} {word.format}" for word in found) == words

@@ -15,16 +15,16 @@ ABOUT_BACKUP = "Every setting, in units and raw, one per line (TOML)."
 
 
 def test_backup_has_the_settings_and_a_report_everything() -> None:
-    asked: list[tuple[object, ...]] = []
+    requests: list[tuple[object, ...]] = []
     session = SimpleNamespace(profile=None, device=7)
     here: Any = SimpleNamespace(
-        _ask_for_file=lambda *of: asked.append(of), _set_text="text", _setting_codes=["ACC"],
+        _ask_for_file=lambda *of: requests.append(of), _set_text="text", _setting_codes=["ACC"],
         session=session,
         app=SimpleNamespace(line_text="", opened=None, clock=SimpleNamespace(wall=lambda: 0.0)),
     )  # fmt: skip
     SetKeys.action_save_file(here)
     SetKeys.action_report(here)
-    backup, (question, suffix, about, text, codes) = asked
+    backup, (question, suffix, about, text, codes) = requests
     assert backup == ("Back up to", "toml", ABOUT_BACKUP, "text", ["ACC"])
     assert (question, suffix, codes) == ("Report to", "md", [])
     assert callable(text)
@@ -43,8 +43,8 @@ def test_only_a_named_file_is_read_for(name: str | None, reads: int) -> None:
     )
     SetKeys._ask_for_file(here, "Back up to", "toml", ABOUT_BACKUP, str, ["ACC"])  # type: ignore[arg-type]
     ((requested, reported),) = pushed
-    told = vars(requested)
-    assert {"Back up to", "new.toml", ABOUT_BACKUP, "Save"} <= set(map(str, told.values()))
+    given = vars(requested)
+    assert {"Back up to", "new.toml", ABOUT_BACKUP, "Save"} <= set(map(str, given.values()))
     reported(name)
     path = Path("~/a.toml").expanduser()
     assert works == [((path, str, ["ACC"]), {"exclusive": True, "group": "sets"})] * reads

@@ -36,7 +36,9 @@ def csv_text(rows: Iterable[Iterable[object]], end: str = "\r\n") -> str:
     import io
 
     text = io.StringIO(newline="")
-    csv.writer(text, lineterminator=end).writerows(map(plain_cells, rows))
+    writer = csv.writer(text, lineterminator=end)
+    for row in rows:
+        writer.writerow(plain_cells(row))
     return text.getvalue()
 
 
