@@ -6,6 +6,7 @@ import gc
 import os
 import shutil
 import sys
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import chain, count, groupby
@@ -148,3 +149,13 @@ def need_peer(reason: str) -> None:
     if os.environ.get("DRIVEPANEL_PEERS") == "required":
         pytest.fail(reason)
     pytest.skip(reason)
+
+
+@pytest.fixture
+def in_utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Local times are those of UTC, as in recorded texts."""
+    monkeypatch.setenv("TZ", "UTC")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()

@@ -8,7 +8,6 @@ from __future__ import annotations
 import io
 import tempfile
 import threading
-import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from dataclasses import replace
@@ -292,16 +291,7 @@ SECTIONS = (
 )  # fmt: skip
 
 
-@pytest.fixture(autouse=True)
-def in_utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Texts have local times."""
-    monkeypatch.setenv("TZ", "UTC")
-    time.tzset()
-    yield
-    monkeypatch.undo()
-    time.tzset()
-
-
+@pytest.mark.usefixtures("in_utc")
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)
 def test_values_are_printed_as_recorded(section: Callable[[], Iterator[str]]) -> None:
     assert "\n".join(section()) == sections(TEXTS)[section.__name__]

@@ -8,7 +8,6 @@ from __future__ import annotations
 import asyncio
 import io
 import re
-import time
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -285,16 +284,6 @@ def archives() -> Iterator[str]:
 
 
 SECTIONS = (mappings, written_outputs, proposals, triggers, archives)
-
-
-@pytest.fixture
-def in_utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Triggers have local times."""
-    monkeypatch.setenv("TZ", "UTC")
-    time.tzset()
-    yield
-    monkeypatch.undo()
-    time.tzset()
 
 
 @pytest.mark.usefixtures("in_utc")

@@ -6,7 +6,6 @@ drives, their trends and trips, and the texts about a timeout.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from datetime import UTC, datetime
@@ -330,16 +329,6 @@ def timeouts() -> Iterator[str]:
 
 
 SECTIONS = (health, alarms, trends, notes, histories, trips, snapshots, timeouts)
-
-
-@pytest.fixture
-def in_utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Texts have local times."""
-    monkeypatch.setenv("TZ", "UTC")
-    time.tzset()
-    yield
-    monkeypatch.undo()
-    time.tzset()
 
 
 @pytest.mark.usefixtures("in_utc")
