@@ -18,7 +18,7 @@ import msgspec
 import pytest
 
 from tests.cli.test_recorded_states import session_of
-from tests.cli.test_recorded_values import Terminal, in_utc, printed, terminal
+from tests.cli.test_recorded_values import Terminal, printed, terminal
 from tests.drive.test_whole_values import whole
 from tests.recorded import sections
 from tests.session.test_listening import BOTH, BOTH_REPLY, Heard, named
@@ -67,8 +67,6 @@ from tui.session.monitor.look import Look
 from tui.session.settings.applied import EditOutcome, Result
 from tui.session.timeout_report import Timeout
 from tui.simulator.proving.proof_bench import ProofStep
-
-__all__ = ["in_utc"]
 
 TEXTS = Path(__file__).parent / "recorded_reports.txt"
 SETTING = LineSetting(19200, "8E1")
@@ -355,6 +353,7 @@ SECTIONS = (
 )  # fmt: skip
 
 
+@pytest.mark.usefixtures("in_utc")
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)
 def test_reports_are_printed_as_recorded(section: Callable[[], Iterator[str]]) -> None:
     assert "\n".join(section()) == sections(TEXTS)[section.__name__]

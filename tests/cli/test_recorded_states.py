@@ -14,7 +14,7 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from tests.cli.test_recorded_values import in_utc, printed
+from tests.cli.test_recorded_values import printed
 from tests.drive.test_whole_values import HELD, OTHER, whole
 from tests.recorded import sections
 from tests.session.test_recorded_texts import NETWORK, SERIAL, SIGHTS
@@ -64,8 +64,6 @@ from tui.session.reading import Reading
 from tui.session.shown import Quality
 from tui.session.starts.record import StartRecord
 from tui.session.timeout_report import Timeout, TimeoutWatch
-
-__all__ = ["in_utc"]
 
 TEXTS = Path(__file__).parent / "recorded_states.txt"
 WALL = StillClock().wall()
@@ -326,6 +324,7 @@ SECTIONS = (
 )  # fmt: skip
 
 
+@pytest.mark.usefixtures("in_utc")
 @pytest.mark.parametrize("section", SECTIONS, ids=lambda section: section.__name__)
 def test_states_are_printed_as_recorded(section: Callable[[], Iterator[str]]) -> None:
     assert "\n".join(section()) == sections(TEXTS)[section.__name__]

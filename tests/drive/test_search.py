@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import time
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -135,21 +134,6 @@ def test_long_text_is_searched_for_once(monkeypatch: pytest.MonkeyPatch) -> None
     assert len(searched) == 1
     assert search.scores("zz yy xx ww vv") == {}
     assert len(searched) < 20
-
-
-def test_unmatched_words_take_little_longer_than_a_match() -> None:
-    """They are searched for again without some of them, between two keys."""
-    search = parameter_search(library.load("atv71"))
-
-    def fastest(text: str) -> float:
-        times = []
-        for _ in range(9):
-            begin = time.perf_counter()
-            search.scores(text)
-            times.append(time.perf_counter() - begin)
-        return min(times)
-
-    assert fastest("aaa bbb ccc ddd eee") < 6 * fastest("ramp")
 
 
 def test_number_and_address_find_their_parameter() -> None:
