@@ -349,20 +349,36 @@ def test_quick_stop_bit_is_lit_only_in_states_where_it_counts(
     assert lit or "active" not in line
 
 
+TIMEOUT_RULES = ATV71.data.communication_fault
+REACTIONS = {item.name: item for item in TIMEOUT_RULES.reactions} if TIMEOUT_RULES else {}
+
+
 @pytest.mark.parametrize(
-    ("heard", "text"),
-    [(95.0, "reacts in 5 s: its own reaction"), (80.0, "has reacted by now: its own reaction")],
+    ("reaction", "heard", "text"),
+    [
+        (None, 95.0, "reacts in 5 s: its own reaction"),
+        (None, 80.0, "should have reacted"),
+        ("DC injection", 95.0, "reacts in 5 s: DC injection"),
+        ("Fast stop", 80.0, "should have reacted: fast stop"),
+        ("Stop as in STT", 80.0, "should have reacted: stop as in STT"),
+        ("Speed maintained", 80.0, "MAY STILL RUN: speed maintained"),
+        ("Ignored", 80.0, "MAY STILL RUN: ignored"),
+    ],
 )
-def test_reaction_of_an_unpolled_drive_is_counted_down(heard: float, text: str) -> None:
+def test_reaction_of_an_unpolled_drive_is_counted_down_and_never_stated_as_a_fact(
+    reaction: str | None, heard: float, text: str
+) -> None:
     view = replace(
         view_of(ATV71, fakes.RUNNING, age=50.0),
         now=100.0,
         heard=heard,
-        watch=TimeoutWatch(10.0, None),
+        watch=TimeoutWatch(10.0, REACTIONS[reaction] if reaction else None),
         line=fakes.LOST,
     )
     assert countdown(view) == text
     assert countdown(replace(view, watch=None)) == ""
+    rows = [line.plain for line in state_lines(view, 25)]
+    assert not any("…" in row for row in rows), rows
 
 
 @pytest.mark.parametrize(
@@ -405,7 +421,7 @@ def test_half_of_the_timeout_without_an_answer_is_marked(age: float, late: bool)
         (None, 40, "none known"),
         (TimeoutWatch(0.5, None), 40, "0.5 s"),
         (TimeoutWatch(10.0, None, active=False), 60, "10 s, starts when commanded"),
-        (TimeoutWatch(10.0, None, active=False), 22, "10 s, off"),
+        (TimeoutWatch(10.0, None, active=False), 22, "10 s, at run"),
     ],
 )
 def test_timeout_of_a_drive_that_was_not_polled_yet(

@@ -29,6 +29,12 @@ def capitalized(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def uncapitalized(text: str) -> str:
+    """Return a text of a profile with a small first letter; an abbreviation keeps its capitals."""
+    first, rest = text[:1], text[1:]
+    return text if rest[:1].isupper() or not rest else first.lower() + rest
+
+
 def all_of(names: Sequence[str]) -> str:
     """Return names as one part of a sentence, with `and` before the last."""
     *first, last = names or ("none",)

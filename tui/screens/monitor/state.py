@@ -9,6 +9,7 @@ from rich.text import Text
 
 from tui.bus.api import DeviceCounters, LineStatus
 from tui.drive.profile.schema import Quantity
+from tui.drive.sentences import uncapitalized
 from tui.drive.values import NOT_AVAILABLE
 from tui.safety import WARNED_AT_SHARE
 from tui.session.command.stop_report import MAY_COAST, NOT_STOPPED, NOT_STOPPING, Phase, StopReport
@@ -218,7 +219,8 @@ def _timeout(view: View, width: int) -> tuple[str, Style]:
     if not watch.acts:
         return "off", FAINT
     whole = f"{text}, starts when commanded"
-    return whole if width >= STATE_LABEL_CELLS + len(whole) else f"{text}, off", FAINT
+    fits = width >= STATE_LABEL_CELLS + len(whole)
+    return whole if fits else f"{text}, at run", FAINT
 
 
 def _polled(view: View, text: str, timeout: float, cells: int) -> tuple[str, Style]:
@@ -259,9 +261,19 @@ def _answers(view: View, width: int) -> Text:
 
 
 def countdown(view: View) -> str:
-    """Return the drive's reaction when polling stops, and the seconds left; empty if none."""
+    """Return the reaction expected of the drive when polling stops, or the seconds left for it.
+
+    Empty without an active timeout. No reply confirms a reaction, so it is never stated as a fact.
+    """
     left = view.time_left
     if left is None or view.watch is None:
         return ""
-    does = view.watch.reaction.name.lower() if view.watch.reaction else "its own reaction"
-    return f"reacts in {left:.0f} s: {does}" if left > 0 else f"has reacted by now: {does}"
+    reaction = view.watch.reaction
+    does = uncapitalized(reaction.name) if reaction else "its own reaction"
+    if left > 0:
+        return f"reacts in {left:.0f} s: {does}"
+    if reaction is None:
+        return "should have reacted"
+    if reaction.motor_keeps_running:
+        return f"MAY STILL RUN: {does}"
+    return f"should have reacted: {does}"

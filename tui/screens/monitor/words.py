@@ -11,7 +11,7 @@ from rich.text import Text
 
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Bit, Parameter
-from tui.drive.sentences import capitalized
+from tui.drive.sentences import capitalized, uncapitalized
 from tui.drive.values import NOT_AVAILABLE
 from tui.widgets.drawing import cut, rule
 from tui.widgets.palette import ALARM, BAR, FAINT, KEY, LINE, PLAIN, STRONG
@@ -147,8 +147,7 @@ def short_bit(bit: Bit, *, on: bool) -> str:
     for words in (message.casefold(), *([bit.name.casefold()] if on else [])):
         if words in SHORT_NAMES:
             return SHORT_NAMES[words]
-    first, rest = message[:1], message[1:]
-    return message if rest[:1].isupper() or not rest else first.lower() + rest
+    return uncapitalized(message)
 
 
 def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
