@@ -255,10 +255,11 @@ async def test_r_at_0_hz_asks_for_a_reference() -> None:
         await until(made.pilot, lambda: "The reference is 0" in output(made.app))
         before = writes(made.app)
         await made.pilot.press("enter")
-        await made.message("At 0 the motor would not turn")
+        await made.message("The reference is 0. Type a reference, then Enter.")
+        assert "RUN FORWARD" in output(made.app)
         assert writes(made.app) == before
         await made.pilot.press("2", "0")
-        await until(made.pilot, lambda: "At 0" not in output(made.app))
+        await until(made.pilot, lambda: "Type a reference" not in output(made.app))
         await made.pilot.press("enter")
         await until(made.pilot, lambda: made.speed() > 2)
 

@@ -44,7 +44,8 @@ STEPS: Mapping[str, Decimal] = {
 }
 """Steps of a reference by key: in its unit, or in tens of rpm."""
 DIGITS_MOST = 7
-AT_ZERO = "At 0 the motor would not turn: type a reference, then Enter."
+NOTHING_TYPED = "Type a reference, then Enter."
+AT_ZERO = f"The reference is 0. {NOTHING_TYPED}"
 GROUND_OF_LINE = Style(bgcolor=SURFACE)
 BEFORE_RAMP: Mapping[str, Quantity] = {
     "command_frequency": "frequency_reference",
@@ -116,9 +117,9 @@ class RunLine:
 
     @property
     def is_zero(self) -> bool:
-        """True if the reference is 0, which turns no motor."""
+        """True if a reference of 0 is typed; with a low limit above 0 the motor runs at that."""
         try:
-            return bool(self.unit) and Decimal(self.text or "0") == 0
+            return bool(self.unit) and Decimal(self.text) == 0
         except InvalidOperation:
             return False
 
@@ -126,13 +127,13 @@ class RunLine:
         """Return the line with the error in its reference, if there is one."""
         if not self.unit:
             return self
-        if self.text and self.is_zero and self.purpose != "reference":
-            return replace(self, fault=AT_ZERO)
+        if not self.text:
+            return replace(self, fault=NOTHING_TYPED)
         try:
             parse_reference(profile, self.reference or "", readings)
         except ValueRefused as refused:
             return replace(self, fault=str(refused))
-        return replace(self, fault="")
+        return replace(self, fault=AT_ZERO if self.is_zero and self.purpose != "reference" else "")
 
 
 def proposed(
@@ -211,14 +212,16 @@ def run_lines(
 def _parts_of(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Style]]:
     """Return the notice above the line in at most two rows, with its style.
 
-    It is the error in the reference, else a command without effect, else a reference of 0.
+    It is the error in the reference, else a command without effect, else a reference of 0 or none.
     """
     if line.fault:
         message, style = line.fault, ALARM
     elif hindrance and line.purpose != "reference":
         message, style = f"No effect. {hindrance}", ALARM
     elif line.is_zero and line.purpose != "reference":
-        message, style = "The reference is 0. Type a reference.", ATTENTION
+        message, style = AT_ZERO, ATTENTION
+    elif line.unit and not line.text:
+        message, style = NOTHING_TYPED, ATTENTION
     else:
         return []
     return [(part, style) for part in wrapped(message, width, 2)]
@@ -273,7 +276,7 @@ def _around(
     if ramp is not None:
         parts.append(f"ramp {ramp:f} s")
         reaches = line.unit == "Hz" and line.purpose != "reference" and not line.fault
-        if reaches and not line.is_zero and output is not None:
+        if reaches and line.text and not line.is_zero and output is not None:
             parts += _there_in(line, profile, readings, output)
     return parts
 
