@@ -451,11 +451,11 @@ def test_values_and_frame_are_shown_before_sending() -> None:
         assert reported.wanted == {"CMD": 15, "HSP": 450}
         first, second, third, *rest = reported.follows.splitlines()
         assert (first, second) == ("NCA1: CMD 16#000F", "NCA3: HSP 45.0 Hz")
-        assert "Also written, with its present value: LFRD" in third
+        assert "Also written, with the value that is read just before: LFRD" in third
         # three words from NC1 on: the command, the current reference, the high speed
-        assert (
-            rest[-1].replace(" ", "").lower().startswith("frame:011731c5000831d9000306000f038401c2")
-        )
+        label, frame = rest[-1].split(": ")
+        assert label == "Frame with LFRD 900 rpm"
+        assert frame.replace(" ", "").lower().startswith("011731c5000831d9000306000f038401c2")
 
 
 def test_value_with_an_unknown_scale_is_shown_raw() -> None:
@@ -511,7 +511,7 @@ def test_slots_waiting_for_a_reset_are_not_used_for_writing() -> None:
             refuse_pending(outputs, {"F871": 3, "F875": 1})
         # slots of the other block, and unwritten ones, block nothing
         refuse_pending(outputs, {"F875": 1, "F870": 6})
-        reported = intended_of(here, outputs, "FA01=60")
+        reported = intended_of(here, outputs, "FA00=16#0400 FA01=60")
         assert "F870 and F871 were set before" in reported.follows
         # this drive has no function 23: a write of two words, and nothing comes back
         assert "Frame: 01 10 18 70 00 02 04" in reported.follows

@@ -44,9 +44,8 @@ class BlockKeys(ArmingKeys):
             return
 
         try:
-            about = (
-                f"CODE=VALUE for one or more output slots. Present values: {block_editor.example()}"
-            )
+            held = block_editor.example() or "not read yet"
+            about = f"CODE=VALUE for one or more output slots. Present values: {held}"
         except DriveError as refused:
             self._refuse(str(refused))
             return

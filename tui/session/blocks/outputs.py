@@ -42,10 +42,15 @@ def example(
     raws: Mapping[str, int],
     absent: Collection[str],
 ) -> str:
-    """Return an example text with the current values of the first two of these outputs."""
+    """Return an example text with the last values of the first two of these outputs.
+
+    An output that was not read is left out; empty if none was.
+    """
     first = list(output_codes(profile, outputs).values())[:2]
     return " ".join(
-        f"{p.code}={typed_text(profile, p, raws.get(p.code, 0), raws, absent)}" for p in first
+        f"{p.code}={typed_text(profile, p, raws[p.code], raws, absent)}"
+        for p in first
+        if p.code in raws
     )
 
 
@@ -65,8 +70,8 @@ def intended(
     """
     possible = output_codes(profile, outputs)
     wanted: dict[str, int] = {}
-    for part in text.replace(",", ".").split():
-        code, sign, value = part.partition("=")
+    for part in text.split():
+        code, sign, value = part.replace(",", ".").partition("=")
         parameter = profile.find(code)
         if not sign or parameter.code not in possible:
             raise ValueRefused(
@@ -78,12 +83,22 @@ def intended(
         raise ValueRefused(f"Use CODE=VALUE with one of {', '.join(possible)}.")
     places = reach(profile, outputs, wanted)
     lines = [*_lines(profile, outputs, places, wanted, raws, absent)]
-    words = [_word(profile, outputs, place, wanted, raws) for place in places]
     inputs, _ = together(profile, inputs, outputs, "write")
-    lines.append(
-        f"Frame: {hex_text(block_request(profile, device, inputs, outputs, words, places))}"
-    )
+    carried = [code for code in _codes(profile, outputs, places) if code not in wanted]
+    if unread := [code for code in carried if code not in raws]:
+        lines.append(f"Frame: not shown, because {all_of(unread)} was not read yet.")
+    else:
+        words = [_word(profile, outputs, place, {**raws, **wanted}) for place in places]
+        frame = hex_text(block_request(profile, device, inputs, outputs, words, places))
+        held = values_text(profile, {code: raws[code] for code in carried}, raws, absent)
+        lines.append(f"Frame with {held}: {frame}" if held else f"Frame: {frame}")
     return ConfirmedWrite(outputs, inputs, wanted, "\n".join(lines))
+
+
+def _codes(profile: Profile, outputs: Assignment, places: range) -> list[str]:
+    """Return the codes of the parameters in these places."""
+    found = (slot_target(profile, outputs.block, outputs.raws[place]) for place in places)
+    return [parameter.code for parameter in found if parameter is not None]
 
 
 def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:
@@ -125,7 +140,7 @@ def _lines(
         else:
             beside.append(code)
     if beside:
-        lines.append(f"Also written, with its present value: {', '.join(beside)}.")
+        lines.append(f"Also written, with the value that is read just before: {', '.join(beside)}.")
     if block.effective == "after-reset":
         lines.append(
             f"The mapping that {block.name} has had since the last reset cannot be"
@@ -143,16 +158,7 @@ def _moves(profile: Profile, code: str) -> bool:
     return code in commands or profile[code].quantity in REFERENCE_QUANTITIES
 
 
-def _word(
-    profile: Profile,
-    outputs: Assignment,
-    place: int,
-    wanted: Mapping[str, int],
-    raws: Mapping[str, int],
-) -> int:
-    """Return the word for a place, as far as it is known before the exchange."""
+def _word(profile: Profile, outputs: Assignment, place: int, raws: Mapping[str, int]) -> int:
+    """Return the word for a place; 0 for an unused one."""
     parameter = slot_target(profile, outputs.block, outputs.raws[place])
-    if parameter is None:
-        return 0
-    raw = wanted.get(parameter.code, raws.get(parameter.code, 0))
-    return to_words(parameter, raw)[0]
+    return 0 if parameter is None else to_words(parameter, raws[parameter.code])[0]
