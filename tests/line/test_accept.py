@@ -302,6 +302,35 @@ def test_person_ends_the_test(name: str, tmp_path: Path) -> None:
         assert on_record() == []
 
 
+def test_end_of_the_test_takes_a_reference_above_the_limit_back(tmp_path: Path) -> None:
+    with drive() as (simulation, line), above_the_limit(tmp_path, simulation, line) as program:
+        program.type("\x03")
+        assert program.end() == 130, program.text
+        assert simulation.drive(1).raw("LFr") == 500, program.text
+        assert stands(simulation)
+
+
+def test_reference_above_the_limit_is_reported_after_a_stop_by_another_program(
+    tmp_path: Path,
+) -> None:
+    with drive() as (simulation, line), above_the_limit(tmp_path, simulation, line) as program:
+        assert drivepanel("stop", line, "-d", "1", "-p", "atv312").returncode == 0, program.text
+        assert program.end() == 6, program.text
+        kept = "may still hold the reference 51Hz" in program.text
+        assert simulation.drive(1).raw("LFr") == (510 if kept else 500), program.text
+        assert stands(simulation)
+
+
+@contextmanager
+def above_the_limit(folder: Path, simulation: Simulation, line: str) -> Iterator[Acceptance]:
+    """A test that has just given a reference above the high speed."""
+    file = written(folder, 'kind = "limit"\nseconds = 60')
+    with accepting(file, line) as program:
+        program.answer()
+        wait_until(lambda: program.look() and simulation.drive(1).raw("LFr") == 510, "it is above")
+        yield program
+
+
 def test_closed_terminal_stops_the_motor(tmp_path: Path) -> None:
     with motor_of_a_test(tmp_path) as (simulation, _, program):
         program.hang_up()

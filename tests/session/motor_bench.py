@@ -151,8 +151,8 @@ class MotorBench(MotionBench):
             if not self.curve.points or self.motor.now > self.curve.points[-1].time + 0.09:
                 self.curve.points.append(RunPoint(self.motor.now, sign * self.motor.hertz, 2.0))
 
-    def permit(self) -> Any:
-        self.motor.call("permit")
+    def permit(self, *, after_end: bool = False) -> Any:
+        self.motor.call("permit after the end" if after_end else "permit")
 
     def disarm(self) -> None:
         self.motor.call("disarm")

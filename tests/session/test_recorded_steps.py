@@ -23,6 +23,7 @@ from tui.drive.profile import library
 from tui.drive.shown import shown
 from tui.session.acceptance.carry_out import carry_out_step
 from tui.session.acceptance.curve import RunCurve, RunPoint, curve_svg, ramp_seconds
+from tui.session.acceptance.motion import AcceptanceEnded
 from tui.session.acceptance.plan import HighSpeed
 from tui.session.acceptance.report_files import curve_files, result_junit, result_markdown
 from tui.session.acceptance.result import AcceptanceResult, StepResult
@@ -93,6 +94,10 @@ STEPS: Sequence[tuple[str, dict[str, Any], dict[str, Any]]] = (
     ("limit", {"settle": 1.0}, answered()),
     ("limit", {}, answered(put_a_write=DeviceException(4, 6, 1, 3))),
     ("limit", {}, answered(put_a_write=NoAnswer(4, 6, 1))),
+    ("limit", {}, {**answered(put_a_write=NoAnswer(4, 6, 1)), "raws": {"LFr": 500}}),
+    ("limit", {}, {**answered(put_a_write=NoAnswer(4, 6, 1)), "raws": {"LFr": 510}}),
+    ("limit", {}, answered(put_a_write=AcceptanceEnded("Ctrl-C"), refer_50=NoAnswer(4, 6, 1))),
+    ("limit", {}, answered(put_a_write=52.0, refer_50=NoAnswer(4, 6, 1))),
     ("communication-loss", LOSS, PROVED), ("communication-loss", {"timeout": 2.1}, PROVED),
     ("communication-loss", {**LOSS, "reaction": "Freewheel stop"}, PROVED),
     ("communication-loss", {**LOSS, "reaction": "Ramp stop"}, PROVED),

@@ -5,12 +5,13 @@ Steps that measure a motion are in a module of their own.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Mapping
 from types import MappingProxyType
 from typing import Any
 
-from tui.bus.errors import DeviceException
-from tui.drive.errors import ValueRefused
+from tui.bus.errors import DeviceException, LineError
+from tui.drive.errors import DriveError, ValueRefused
 from tui.drive.settings.compare import compare_settings, side_of
 from tui.drive.shown import raw_of_text, shown
 from tui.drive.values import NOT_AVAILABLE
@@ -21,6 +22,7 @@ from ..command.reference import convert_reference, reference_codes
 from ..monitor.snapshot import Snapshot
 from ..proof.prover import NothingToProve, Prover
 from ..proof.result import ProofResult, proof_entry
+from ..reading import with_text
 from ..running.ending import MotorStopped
 from ..running.watching import latest_of, outcome_or_error
 from ..settings.write import NotTaken
@@ -31,6 +33,9 @@ from .plan import read_high_speed
 from .result import StepResult
 from .step_work import SETTLED_HERTZ, StepWork
 from .steps import CommunicationLossStep, LimitStep, RefusedStep, ResetStep, SettingsStep
+
+RESTORED_WITHIN = 10.0
+"""Seconds within which a reference above the high speed is taken back."""
 
 
 async def run_limit(work: StepWork, step: LimitStep, result: StepResult) -> None:
@@ -45,12 +50,16 @@ async def run_limit(work: StepWork, step: LimitStep, result: StepResult) -> None
     over = f"{most + step.over:g}Hz"
     allowed = most + min(step.tolerance, step.over / 2)
     highest = 0.0
+    is_above = False
 
     async def exceed() -> None:
-        nonlocal highest
+        nonlocal highest, is_above
         await work.reach(most, step.settle)
         bench.curve.marks.append((bench.console.session.clock.monotonic(), over))
+        # without a reply, or with an end in between, the drive may hold it
+        is_above = True
         if refusal := await _reference_above(work, over):
+            is_above = False
             result.check(f"Reference {over}", refusal, "refused or limited", passed=True)
             return
         clock = bench.console.session.clock
@@ -63,23 +72,54 @@ async def run_limit(work: StepWork, step: LimitStep, result: StepResult) -> None
             await bench.sleep(0.02)
         else:
             await bench.refer(most)
+            is_above = False
         # a motor that slowed down, or was not read, shows nothing about the limit
         passed = most - SETTLED_HERTZ <= highest <= allowed
         text = f"{most:g} Hz ({code}), at most {allowed:g} Hz"
         result.check(f"Output with {over}", f"{highest:.1f} Hz", text, passed=passed)
 
-    await work.run(most, exceed, result)
-    if highest > allowed:
-        await _restore_reference(work, most)
-
-
-async def _restore_reference(work: StepWork, hz: float) -> None:
-    """Give the drive a reference within its limit again, with its motor at standstill."""
-    work.bench.permit()
     try:
-        await work.bench.unless_ended(work.bench.refer(hz))
+        await work.run(most, exceed, result)
     finally:
-        work.bench.disarm()
+        if is_above and (failed := await _restore_reference(work, most)):
+            text = f"{most:g} Hz again"
+            result.check("Reference after the step", f"perhaps still {over}", text, passed=False)
+            bench.warn(
+                f"The drive may still hold the reference {over}: {failed}\n"
+                f"Give it a reference of at most {most:g} Hz before its motor is started."
+            )
+
+
+async def _restore_reference(work: StepWork, hz: float) -> str:
+    """Give the drive a reference within its limit again, also after the end of the test.
+
+    Writes nothing if the drive holds one within its limit already: another source may have given
+    it. Returns why it failed; empty if it did not.
+    """
+    bench = work.bench
+    try:
+        bench.permit(after_end=True)
+        async with asyncio.timeout(RESTORED_WITHIN):
+            held = await _held_reference(work)
+            if held is None or held > hz:
+                await bench.refer(hz)
+    except TimeoutError:
+        return f"nothing was written within {RESTORED_WITHIN:g} s."
+    except (DriveError, LineError) as error:
+        return str(error)
+    finally:
+        bench.disarm()
+    return ""
+
+
+async def _held_reference(work: StepWork) -> float | None:
+    """Return the reference in Hz that the drive holds, without its sign; None if unknown."""
+    console = work.bench.console
+    parameter = console.session.profile.quantity("command_frequency")
+    if parameter is None or parameter.access == "w":
+        return None
+    number = with_text(await console.read([parameter.code]))[parameter.code].number
+    return None if number is None else abs(number)
 
 
 async def _reference_above(work: StepWork, text: str) -> str:

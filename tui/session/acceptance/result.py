@@ -27,7 +27,7 @@ class LimitCheck:
     @property
     def text(self) -> str:
         """The comparison as a sentence."""
-        return f"{self.name}: {self.value}, allowed: {self.limit}."
+        return f"{self.name}: {self.value.rstrip('.')}, allowed: {self.limit}."
 
 
 @dataclass(slots=True)
