@@ -149,7 +149,7 @@ def history_texts(
     gaps = [(seconds(begin), seconds(end)) for begin, end in gaps_of(found.points, reach)]
     yield f"  {reach:.3f} {gaps} {[number_text(found, n) for n in (0, 1.25, -3e7)]}"
     for column in history_columns(found.points, BEGIN, 200.0, 7):
-        yield f"  {column and tuple(round(each, 4) for each in column)}"
+        yield f"  {column and tuple(each if each is None else round(each, 4) for each in column)}"
 
 
 WORDS = (0, 1, 7, 0x7FFF, 0x8000, 0xFFFE, 300)

@@ -305,13 +305,16 @@ class ValueTable:
         )
         for code, point in row.points.items():
             found = self._histories[row.device][code]
-            if point.mean is None or point.least is None or point.most is None:
+            if point.mean is None:
                 reasons.append(f"{code}: {point.quality}")
+            if point.least is None or point.most is None:
                 continue
             if not point.exact:
                 reasons.append(f"{code}: minimum and maximum are limits")
             ends = number_text(found, point.least), number_text(found, point.most)
-            mean = f"{point.mean:.6g}" if point.reduced and ends[0] != ends[1] else ends[0]
+            mean = "" if point.mean is None else ends[0]
+            if point.mean is not None and point.reduced and ends[0] != ends[1]:
+                mean = f"{point.mean:.6g}"
             texts[value_title(code, found)] = (mean, *ends)
         after = from_trigger(row.time, self._triggers)
         cells = [*both_times(row.time), *([f"{after:.3f}"] if after is not None else [])]

@@ -160,11 +160,12 @@ def samples_of_points(points: Sequence[HistoryPoint], until: float) -> Samples:
     for point in points:
         if point.time > until:
             break
-        if point.mean is None or not point.reduced:
+        if point.least is None or not point.reduced:
             samples.append((point.time, point.mean))
             continue
         middle = (point.time + point.end) / 2
-        samples += [(middle, point.least), (middle, point.most), (middle, point.mean)]
+        mean = point.most if point.mean is None else point.mean
+        samples += [(middle, point.least), (middle, point.most), (middle, mean)]
     return samples
 
 

@@ -27,7 +27,8 @@ class LimitCheck:
     @property
     def text(self) -> str:
         """The comparison as a sentence."""
-        return f"{self.name}: {self.value.rstrip('.')}, allowed: {self.limit}."
+        value = self.value.removesuffix(".")
+        return f"{self.name}: {value}, allowed: {self.limit}."
 
 
 @dataclass(slots=True)

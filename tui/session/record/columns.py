@@ -20,8 +20,8 @@ class HistoryColumn(NamedTuple):
     """Values of one column."""
 
     least: float
-    mean: float
-    """Mean of the replies, each with the same weight."""
+    mean: float | None
+    """Mean of the replies, each with the same weight; None if a point has none."""
     most: float
     good: int
     bad: int
@@ -50,18 +50,20 @@ def history_columns(
 
 def _column(points: Sequence[HistoryPoint]) -> HistoryColumn | None:
     least, most, total, good, bad = math.inf, -math.inf, 0.0, 0, 0
-    reduced, exact = False, True
+    reduced, exact, has_mean = False, True, True
     for point in points:
         bad += point.bad
-        if point.least is None or point.mean is None or point.most is None:
+        if point.least is None or point.most is None:
             continue
         least, most = min(least, point.least), max(most, point.most)
-        total += point.mean * point.good
+        has_mean = has_mean and point.mean is not None
+        total += (point.mean or 0.0) * point.good
         good += point.good
         reduced, exact = reduced or point.reduced, exact and point.exact
     if not good:
         return None
-    return HistoryColumn(least, total / good, most, good, bad, reduced, exact)
+    mean = total / good if has_mean else None
+    return HistoryColumn(least, mean, most, good, bad, reduced, exact)
 
 
 def reach_of_points(points: Sequence[HistoryPoint]) -> float:
@@ -86,8 +88,10 @@ def gaps_of(points: Sequence[HistoryPoint], reach: float) -> list[tuple[float, f
     begin: float | None = None
     failed = False
     for point in points:
-        if point.mean is None:
-            failed, begin = True, point.time if begin is None else begin
+        if point.least is None:
+            # a failed read that ended within a reduced point is no gap
+            if begin is None or point.end > begin:
+                failed, begin = True, point.time if begin is None else begin
             continue
         if begin is not None and (failed or point.time - begin > reach):
             gaps.append((begin, point.time))

@@ -21,7 +21,7 @@ WITHOUT_VALUE = "no value"
 NO_GOOD_REPLY = "no good reply"
 UNKNOWN_SCALE = "scale not recorded"
 NOT_KEPT = "changed within 10 s"
-"""Quality of a part of a word that changed: the record has no extent of it."""
+"""Quality of names or bits that changed, and of a part of a word, which has no extent."""
 OTHER_UNIT = "in another unit"
 _GOOD = QUALITIES[0]
 
@@ -36,6 +36,7 @@ class HistoryPoint(NamedTuple):
     least: float | None
     """None, as the next two, if there is no value; `quality` gives the reason."""
     mean: float | None
+    """None too for names or bits that changed: their mean means nothing."""
     most: float | None
     quality: str = _GOOD
     good: int = 1
@@ -153,9 +154,12 @@ class PointDecoder:
         if self.unit and unit != self.unit:
             return self._gap(raw, OTHER_UNIT)
         self.unit = unit
-        mean = self._mean(raw.extent, least, most)
+        mean: float | None = self._mean(raw.extent, least, most)
+        quality = raw.quality
+        if least != most and (self.entry.bits or is_enumeration(self.entry)):
+            mean, quality = None, NOT_KEPT
         return HistoryPoint(
-            raw.time / 1e6, raw.end / 1e6, min(least, most), mean, max(least, most), raw.quality,
+            raw.time / 1e6, raw.end / 1e6, min(least, most), mean, max(least, most), quality,
             raw.good, raw.bad, raw.reduced, raw.exact, raw.raw,
         )  # fmt: skip
 
