@@ -31,11 +31,25 @@ def test_word_with_unnamed_bits_only_is_not_called_empty() -> None:
     assert rows["CMI"].endswith("Extended command word: no named bit set")
 
 
+def test_bit_that_means_the_opposite_of_its_name_is_shown_by_its_meaning() -> None:
+    profile = library.load("atv31")
+    for raw, meaning in ((0x0240, "Switch on disabled, No forced local"), (0, "Forced local")):
+        rows = dict(word_rows(profile, readings_of(profile, {"ETA": raw}, NOW)))
+        assert rows["ETA"].endswith(f"Status word: {meaning}")
+    for raw, meaning in ((0x0002, "Enable voltage, Quick stop"), (0, "no bit set")):
+        rows = dict(word_rows(PROFILE, readings_of(PROFILE, {"CMD": raw}, NOW)))
+        assert rows["CMD"].endswith(f"Command word: {meaning}")
+
+
 def test_json_has_the_words_of_each_family_by_quantity() -> None:
     words = json.loads(run(0, "status", "sim:atv71", "--json"))["words"]
     assert words["status_word"] == {
         "code": "ETA", "address": 3201, "raw": 0x0250, "text": "16#0250",
         "bits": ["Power section supplied", "Switch on disabled", "Remote"],
+        "texts": [
+            "Power section supplied", "Switch on disabled",
+            "Remote: command or reference from Modbus",
+        ],
     }  # fmt: skip
     assert words["command_word"]["code"] == "CMD"
     own = json.loads(run(0, "status", "sim:powerdrive", *DRIVE, "--json"))["words"]

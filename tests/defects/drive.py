@@ -494,7 +494,7 @@ DEFECTS = (
     ),
     Defect(
         "statement-at-0-dim",
-        "tui/screens/monitor/words.py",
+        "tui/drive/bit_texts.py",
         "if (bit.on if on else bit.off).casefold() not in PLAIN_ANSWERS:",
         "if on and bit.on.casefold() not in PLAIN_ANSWERS:",
         '"Quick stop active" is dim while the quick stop is active.',

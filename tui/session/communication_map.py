@@ -9,12 +9,13 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from tui.drive.bit_texts import bit_texts
 from tui.drive.blocks.user_words import FORMATS, UserWord, UserWords
 from tui.drive.communication_words import communication_words
 from tui.drive.profile.schema import Block
 from tui.drive.shown import shown
 from tui.drive.signal_path import Signal, path_state, source_name, source_word
-from tui.drive.values import NOT_AVAILABLE, set_bits
+from tui.drive.values import NOT_AVAILABLE
 from tui.safety import LOOK_IS_OLD
 
 from .blocks.editor import read_words
@@ -29,7 +30,7 @@ class MapRow:
     head: str
     text: str
     detail: str = ""
-    """Names of the bits that are 1, or of the word."""
+    """True texts of the bits, or the name of the word."""
 
 
 @dataclass(slots=True)
@@ -111,7 +112,7 @@ class CommunicationMap:
     def _bits(self, code: str) -> str:
         raw = self._raws.get(code)
         bits = self.console.session.profile[code].bits
-        return "" if raw is None else ", ".join(bit.name for bit in set_bits(bits, raw))
+        return "" if raw is None else ", ".join(bit_texts(bits, raw))
 
     # Words of a person's choice, which Scanner shows too
 

@@ -120,13 +120,17 @@ class ValueField(DocumentPart):
 
 
 class StatusWordField(DocumentPart):
-    """A command or status word; `bits` are the names of its bits that are 1."""
+    """A command or status word; `bits` are the names of its bits that are 1.
+
+    `texts` are what its bits mean, at 1 and at 0.
+    """
 
     code: str
     address: int
     raw: int
     text: str
     bits: list[str]
+    texts: list[str]
 
 
 class WatchedValueField(ValueField, kw_only=True):

@@ -6,6 +6,7 @@ import logging
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from tui.drive.bit_texts import bit_texts
 from tui.drive.communication_words import communication_words
 from tui.drive.values import NOT_AVAILABLE, set_bits, without_named_bits
 
@@ -69,7 +70,7 @@ def eeprom_rows(session: DriveSession, counts: DriveCounts | None) -> list[tuple
 
 
 def word_rows(profile: Profile, readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
-    """Return a row for each word: its code, then the number and the names of its bits that are 1.
+    """Return a row for each word: its code, then the number and the true texts of its bits.
 
     `-----` if it was not read just now.
     """
@@ -79,8 +80,7 @@ def word_rows(profile: Profile, readings: Mapping[str, Reading]) -> list[tuple[s
         if reading is None or reading.raw is None or reading.quality != "good":
             rows.append((parameter.code, NOT_AVAILABLE))
             continue
-        names = ", ".join(bit.name for bit in set_bits(parameter.bits, reading.raw))
-        bits = names or without_named_bits(reading.raw)
+        bits = ", ".join(bit_texts(parameter.bits, reading.raw)) or without_named_bits(reading.raw)
         rows.append((parameter.code, f"{reading.text}  {parameter.name}: {bits}"))
     return rows
 
@@ -104,6 +104,7 @@ def word_fields(
                 raw=raw,
                 text=reading.text,
                 bits=[bit.name for bit in set_bits(parameter.bits, raw)],
+                texts=bit_texts(parameter.bits, raw),
             )
         )
     return fields

@@ -2,69 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 from rich.style import Style
 from rich.text import Text
 
+from tui.drive.bit_texts import bit_text, is_true, is_valid, short_bit, true_bits
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Bit, Parameter
-from tui.drive.sentences import capitalized, uncapitalized
 from tui.drive.values import NOT_AVAILABLE
 from tui.widgets.drawing import cut, rule
 from tui.widgets.palette import ALARM, BAR, FAINT, KEY, LINE, PLAIN, STRONG
 
 from .view import View
 
-SHORT_NAMES: Mapping[str, str] = {
-    "ready to switch on": "ready",
-    "operation enabled": "enabled",
-    "power section supplied": "power",
-    "target reached": "at reference",
-    "switch on disabled": "switch on disabled",
-    "no quick stop": "",
-    "remote": "",
-    "direction of the output": "reverse",
-    "limit of the reference": "outside its limits",
-    # bits that are 0
-    "power section supplied: no supply": "no power",
-    "remote: local": "local",
-    "drive ready: not ready": "not ready",
-    "unlock the drive: locked": "locked",
-    "run: stop": "stop",
-    "direction: forward": "",
-    "direction of the output: forward": "",
-    "direction of the reference: forward": "",
-    "direction before the ramp: forward": "",
-    "limit of the reference: within lsp..hsp": "",
-    "reference limit: within lsp..hsp": "",
-    "writes not allowed: allowed": "",
-    "transient state: steady": "",
-    "motor thermal threshold: below": "",
-    "motor 1": "",
-    "pid controller: enabled": "",
-    "ramp 1 (acc, dec)": "",
-    "coast stop: output allowed": "",
-    "standby: starting up": "",
-    "standby with run command: starting up": "",
-    "control: remote": "",
-}
-"""Short forms of bit texts, by the text in lower case; empty for the normal state."""
 CODE_CELLS, RAW_CELLS = 6, 9
 BIT_CELLS = 26
 """Least cells of a bit if bits are in columns."""
-SHORTEST_NAME = 6
-"""Characters of a bit's name that still identify it."""
-PLAIN_ANSWERS = frozenset(
-    {"", "yes", "no", "on", "off", "none", "normal", "0", "1", "in force", "in progress"}
-)
-"""Texts of bits that mean only yes or no: alone they would not name their subject."""
-DENIALS = frozenset({"no", "off", "none", "normal", "0"})
-"""Texts of bits that negate the name of the bit."""
-GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
-"""Texts of bits that add nothing to the name of a bit that is 1."""
 ALL_BITS = (("Tab", KEY), (" all bits ", FAINT))
 NEXT_BITS = (("Tab", KEY), (" next     ", FAINT))
 ALL_BITS_CELLS = 13
@@ -104,9 +60,8 @@ def word_line(view: View, parameter: Parameter, width: int) -> Text:
 
 def _true_words(parameter: Parameter, raw: int) -> Iterator[tuple[str, bool]]:
     """Yield each true bit text in short form, and True if it is an alarm."""
-    for bit in parameter.bits:
-        on = bool(raw >> bit.bit & 1)
-        if _counts(bit, raw) and _holds(bit, on) and (words := short_bit(bit, on=on)):
+    for bit, on in true_bits(parameter.bits, raw):
+        if words := short_bit(bit, on=on):
             yield words, on and bit.alarm
 
 
@@ -139,15 +94,6 @@ def has_alarm(view: View) -> bool:
     if view.snapshot is None or view.lost:
         return False
     return bool(view.snapshot.state.alarms or view.snapshot.state.alarm)
-
-
-def short_bit(bit: Bit, *, on: bool) -> str:
-    """Return a bit's text in a word or two; empty for the normal state."""
-    message = bit.name if on and bit.on.casefold() in GENERIC else _bit_words(bit, on, 60)
-    for words in (message.casefold(), *([bit.name.casefold()] if on else [])):
-        if words in SHORT_NAMES:
-            return SHORT_NAMES[words]
-    return uncapitalized(message)
 
 
 def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
@@ -216,7 +162,7 @@ def _heading(view: View, page: WordPage, width: int) -> Text:
 
 def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
     """Return a bit in exactly `width` cells. The text is cached: copy it before changing it."""
-    if raw is not None and not _counts(bit, raw):
+    if raw is not None and not is_valid(bit, raw):
         return _dim_bit(bit, width)
     return _drawn_bit(bit, None if raw is None else bool(raw >> bit.bit & 1), width)
 
@@ -235,46 +181,7 @@ def _drawn_bit(bit: Bit, on: bool | None, width: int) -> Text:
     room = width - 7
     if on is None:
         return text.append(f"  {cut(bit.name, room)} ", FAINT)
-    true = _holds(bit, on)
+    true = is_true(bit, on)
     alarm = on and bit.alarm
     text.append("●" if true else "·", ALARM if alarm else STRONG if true else FAINT)
-    return text.append(f" {cut(_bit_words(bit, on, room), room)} ", PLAIN if true else FAINT)
-
-
-def _counts(bit: Bit, raw: int) -> bool:
-    """Return True if the bit is valid in the state that its word shows."""
-    return bit.counts is None or raw & bit.counts.mask == bit.counts.value
-
-
-def _holds(bit: Bit, on: bool) -> bool:
-    """Return True if the drawn text is true now; a bit that is 0 may state a fact too."""
-    if (bit.on if on else bit.off).casefold() not in PLAIN_ANSWERS:
-        return True
-    return on or _denied_at_1(bit)
-
-
-def _denied_at_1(bit: Bit) -> bool:
-    """Return True if the name alone would be wrong at 1 and right at 0."""
-    on, off = bit.on.casefold(), bit.off.casefold()
-    return on in DENIALS or (off in PLAIN_ANSWERS - DENIALS and off != "")
-
-
-def _bit_words(bit: Bit, on: bool, room: int) -> str:
-    """Return the name of a bit, its text, or both if they fit in `room` cells.
-
-    A text that means only yes or no is omitted.
-    """
-    message = bit.on if on else bit.off
-    plain = message.casefold() in PLAIN_ANSWERS
-    if not _denied_at_1(bit) and (plain or (on and message.casefold() in bit.name.casefold())):
-        return bit.name
-    alone = capitalized(message)
-    if bit.name.casefold() in message.casefold():
-        return alone
-    both = f"{bit.name}: {message}"
-    if len(both) <= room:
-        return both
-    left = room - len(message) - 3
-    if " " in message or left < SHORTEST_NAME:
-        return alone
-    return f"{bit.name[:left].rstrip()}…: {message}"
+    return text.append(f" {cut(bit_text(bit, on, room), room)} ", PLAIN if true else FAINT)
