@@ -281,7 +281,7 @@ def test_latency_is_reported_if_set_and_measured(
     found = of(DiagnosticEvidence(LINK, 2, PROFILE, port=port, heard=heard, turnaround=turnaround))
     assert found.rung == rung
     if rung == "slow-adapter":
-        assert "17 ms after each request" in found.text
+        assert "17 ms after a request" in found.text
         assert "up to 16 ms" in found.text
         assert "ttyUSB0/latency_timer" in found.steps[0]
 
@@ -373,7 +373,7 @@ async def test_silence_lists_the_checks_of_the_family(line: OpenedLine) -> None:
         functions = {request[1] for request in peer.requests}
     assert functions <= {3, 43}
     neighbor = replace(found.sight, neighbors=(3, 4))
-    assert "while 3, 4 on this line does" in of(neighbor).text
+    assert "while addresses 3 and 4 on this line do." in of(neighbor).text
 
 
 async def test_some_damaged_replies_indicate_a_poor_line(line: OpenedLine) -> None:
@@ -406,7 +406,7 @@ async def test_reply_to_another_function_is_reported(line: OpenedLine) -> None:
 
     with PtyPeer(longer) as peer:
         found = await why(line(peer.path))
-    assert (found.rung, "not as many registers" in found.text) == ("wrong-function", True)
+    assert (found.rung, "not the requested number" in found.text) == ("wrong-function", True)
 
 
 async def test_refusing_drive_is_reported(line: OpenedLine) -> None:
@@ -569,6 +569,13 @@ def test_unsupported_format_of_the_family_is_the_cause() -> None:
     assert found.steps[0] == "Altivar 71 has no 8O2: it has 8O1, 8E1, 8N1, 8N2."
 
 
+def test_few_bytes_before_the_first_request_are_a_possible_cause() -> None:
+    heard = ReplyEvidence(requested=5, answered=5)
+    found = of(DiagnosticEvidence(LINK, 2, PROFILE, heard=heard, loose=4))
+    assert (found.rung, found.certainty) == ("other-master", "possible")
+    assert any("polarization" in other for other in found.others)
+
+
 # The ladder as a whole
 
 EVIDENCE = DiagnosticEvidence(LINK, 2, PROFILE, port=PortSeen(PORT))
@@ -580,6 +587,7 @@ EXAMPLES = {
     "other-unit": replace(EVIDENCE, works=Works("tcp:gateway:502,unit=255", 255)),
     "behind": replace(EVIDENCE, measure=Measure(requested=9, behind=3)),
     "two-drives": replace(EVIDENCE, measure=Measure(requested=9, answered=9, second=3)),
+    "stray-bytes": replace(EVIDENCE, measure=Measure(requested=9, answered=9, stray=1)),
     "swapped": replace(EVIDENCE, measure=Measure(requested=9, answered=9, swapped=3)),
     "lost": replace(EVIDENCE, measure=Measure(requested=9, answered=8, lost=1)),
     "duplicated": replace(EVIDENCE, measure=Measure(requested=9, answered=9, duplicated=1)),

@@ -36,7 +36,7 @@ LATE = "late or repeated, device 4"
 def test_other_master_is_reported_with_its_requests() -> None:
     heard = overheard([came(READ, LATE), came(WRITE, "of device 7"), came(READ, LATE)], 0.0)
     assert heard.text == (
-        "Another master polls drives on this line. Address 4: read of register 3201 to 3208."
+        "Another master polls drives on this line. Address 4: read of registers 3201 to 3208."
         " Address 7: write of register 8501."
     )
 
@@ -63,8 +63,8 @@ def test_own_or_damaged_frames_show_no_master(frames: list[Frame]) -> None:
 
 def test_foreign_replies_and_unknown_bytes_show_a_master() -> None:
     reply = frame(4, bytes.fromhex("03 02 0006"))
-    assert "4 answered it" in overheard([came(reply, LATE)], 0.0).text
-    assert "another baud or format: 6 bytes" in Overheard(loose=6).text
+    assert "address 4 answered it" in overheard([came(reply, LATE)], 0.0).text
+    assert "Received 6 bytes that form no frame" in Overheard(loose=6).text
 
 
 @contextmanager

@@ -187,7 +187,7 @@ def seen(sight: DiagnosticEvidence, line: FramedLine, *, full: bool = False) -> 
     yield f"  {found.rung}, {found.certainty}: {found.text} {found.others}"
     empty = DiagnosticEvidence(sight.link, sight.device, port=PORT)
     for name in ("trouble", "port", "changed", "heard", "withheld", "errors", "turnaround",
-                 "overheard", "measure", "works", "behind", "idle_closed", "idle",
+                 "overheard", "loose", "measure", "works", "behind", "idle_closed", "idle",
                  "neighbors", "identity"):  # fmt: skip
         if (value := getattr(sight, name)) != getattr(empty, name):
             value = str(value) if isinstance(value, Exception) else value
@@ -288,6 +288,12 @@ def overhear(line: FramedLine, at: float, data: bytes, note: str) -> None:
     at_time(line, at, lambda: line.hear("in", data, note))
 
 
+def noise_twice(line: FramedLine) -> None:
+    """Noise while it is monitored, and again as long later."""
+    for at in (0.7, 2.2):
+        overhear(line, at, b"\x81" * 4, "noise")
+
+
 MASTER = frame(7, bytes.fromhex("030C810001"))
 SLAVE = frame(7, bytes.fromhex("03020637"))
 
@@ -359,6 +365,8 @@ def serial_lines() -> Iterator[str]:
         ("master before", lambda line: overhear(line, 0.7, MASTER, "late or repeated"), well),
         ("slave before", lambda line: overhear(line, 0.7, SLAVE, "late or repeated"), well),
         ("noise before", lambda line: overhear(line, 0.7, b"\x81\x82\x83\x84", "noise"), well),
+        ("much noise before", lambda line: overhear(line, 0.7, b"\x81\x82" * 4, "noise"), well),
+        ("noise twice", noise_twice, well),
         ("some noise", lambda line: overhear(line, 0.7, b"\x81\x82\x83", "noise"), well),
         ("polls and noise before", poll_and_noise, well),
         ("master meanwhile", lambda line: overhear(line, 1.8, MASTER, "late or repeated"), well),
@@ -440,6 +448,9 @@ def gateways() -> Iterator[str]:
     cases: tuple[tuple[str, Callable[[FramedLine], object], Fault, Any], ...] = (
         ("well", lambda _: None, well, None),
         ("idle close", lambda line: lose(line, 2.9, 3.0), well, None),
+        ("lost in the reads", lambda line: lose(line, 0.3), well, None),
+        ("withheld in the reads", lambda _: None,
+         fails(RequestRefused("Paused by panel (pid 7)."), 20), None),
         ("opened again later", lambda line: lose(line, 4.4, 4.5), well, None),
         ("cut once", lambda line: lose(line, 0.001, 1.0), well, None),
         ("cut for long", lambda line: lose(line, 0.001, 3.2), well, rtu_reply),

@@ -11,11 +11,11 @@ from tui.wire.overheard import overheard_request
 @pytest.mark.parametrize(
     ("data", "text"),
     [
-        (read_frame(4, 3201, 8), "read of register 3201 to 3208"),
+        (read_frame(4, 3201, 8), "read of registers 3201 to 3208"),
         (read_frame(4, 0x03AB, 1), "read of register 939"),
         (frame(4, bytes.fromhex("04 0005 0001")), "read of input register 5"),
         (frame(4, bytes.fromhex("06 2135 0006")), "write of register 8501"),
-        (write_frame(4, 8501, [6, 30]), "write of register 8501 to 8502"),
+        (write_frame(4, 8501, [6, 30]), "write of registers 8501 to 8502"),
         (read_write_frame(4, 3201, 2, 8501, [6]), "function 23"),
         (frame(4, bytes.fromhex("2B 0E 01 00")), "its identity (function 43)"),
         (frame(4, bytes([17])), "its identity (function 17)"),

@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from .observed.splitting import fits_reply, fits_request
 
-READS = {1: "coils", 2: "inputs", 3: "register", 4: "input register"}
-WRITES = {5: "coil", 6: "register", 15: "coils", 16: "register"}
+READS = {1: "coil", 2: "input", 3: "register", 4: "input register"}
+WRITES = {5: "coil", 6: "register", 15: "coil", 16: "register"}
 COILS, ONE = (1, 2), (5, 6)
 REPORT_ID, READ_WRITE, IDENTIFY = 17, 23, 43
 _HEAD = 6
@@ -16,9 +16,9 @@ _HEAD = 6
 
 _TEXTS = {
     (True, False): "read of {kind} {at}",
-    (True, True): "read of {kind} {at} to {last}",
+    (True, True): "read of {kind}s {at} to {last}",
     (False, False): "write of {kind} {at}",
-    (False, True): "write of {kind} {at} to {last}",
+    (False, True): "write of {kind}s {at} to {last}",
 }
 """By whether it reads, and whether it names several words."""
 

@@ -335,6 +335,9 @@ class MeasuredReads(DocumentPart):
     behind: int
     second: Annotated[int, Meta(description="Second replies to one request, with other values.")]
     seconds: float
+    stray: Annotated[
+        int, Meta(description="Intact replies with bytes before or after them that form no frame.")
+    ]
 
 
 class WhyDocument(DriveDocument, kw_only=True):

@@ -119,8 +119,9 @@ def _measured_reads(found: Diagnosis) -> MeasuredReads | None:
         foreign=measure.foreign,
         unreached=measure.unreached,
         behind=measure.behind,
-        second=measure.second,
+        second=measure.second + measure.surplus,
         seconds=round(measure.seconds, 2),
+        stray=measure.stray,
     )
 
 

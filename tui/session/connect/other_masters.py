@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineError
 from tui.bus.trace import Frame
-from tui.drive.sentences import first_of
+from tui.drive.sentences import counted, first_of
 from tui.wire.frames import is_whole
 from tui.wire.overheard import OverheardRequest, overheard_request
 
@@ -24,6 +24,10 @@ TEXTS_OF_EACH = 3
 """Number of different requests to one address that are listed."""
 NOT_AWAITED = ("late or repeated", "noise")
 """Notes on frames that arrived while no reply was due."""
+
+
+_ANSWERED_ONE = "Another master polls drives on this line: address {who} answered it."
+_ANSWERED_SEVERAL = "Another master polls drives on this line: addresses {who} answered it."
 
 
 class OtherMaster(LineError):
@@ -41,6 +45,11 @@ class Overheard:
     """Bytes that form no frame at this baud and format."""
 
     @property
+    def has_frames(self) -> bool:
+        """True if a frame of another master was heard."""
+        return bool(self.requests or self.answered)
+
+    @property
     def text(self) -> str:
         """The other master in a sentence: its requests by address; empty if there is none."""
         if self.requests:
@@ -49,12 +58,11 @@ class Overheard:
             return " ".join(["Another master polls drives on this line.", *reported])
         if self.answered:
             who = addresses_text(self.answered)
-            return f"Another master polls drives on this line: {who} answered it."
+            return counted(len(self.answered), _ANSWERED_ONE, _ANSWERED_SEVERAL, who=who)
         if self.loose >= TALK:
             return (
-                f"Another device sends on this line at another baud or format: {self.loose} bytes"
-                " that"
-                " form no frame."
+                f"Received {self.loose} bytes that form no frame: another device sends at another"
+                " baud or format, or it is noise."
             )
         return ""
 

@@ -9,13 +9,22 @@ from dataclasses import dataclass, field
 
 from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
 from tui.bus.limits import STANDARD_EXCEPTIONS
-from tui.drive.sentences import all_of
+from tui.drive.sentences import all_of, counted
 
+from ..connect.other_masters import Overheard
 from . import next_steps as steps
 from .evidence import DiagnosticEvidence
 from .gateway_probe import GATEWAY_CODES, gateway_codes
 from .next_steps import speed_text
-from .sick_rungs import CERTAIN, GATEWAY_RUNGS, SICK_RUNGS, Check, first_sentence
+from .sick_rungs import (
+    CERTAIN,
+    GATEWAY_RUNGS,
+    NOISE_CAUSE,
+    POSSIBLE,
+    SICK_RUNGS,
+    Check,
+    first_sentence,
+)
 
 HELD_BACK = 8
 """Latency of an adapter in ms from which it is reported."""
@@ -106,8 +115,8 @@ def _says_slow(sight: DiagnosticEvidence) -> str:
     assert sight.port is not None
     assert sight.turnaround is not None
     return (
-        f"The drive answers, {sight.turnaround * 1000:.0f} ms after each request: the adapter keeps"
-        f" bytes back for up to {sight.port.latency} ms (its latency timer)."
+        f"The drive usually answers {sight.turnaround * 1000:.0f} ms after a request: the adapter"
+        f" keeps bytes back for up to {sight.port.latency} ms (its latency timer)."
     )
 
 
@@ -142,8 +151,13 @@ def _says_garbled(sight: DiagnosticEvidence) -> str:
     return text.format(port=all_of(port), reported=reported, count=sight.heard.garbage)
 
 
+def _has_values(sight: DiagnosticEvidence) -> bool:
+    """True if the drive answered a later read with values."""
+    return sight.measure is not None and sight.measure.has_values
+
+
 def _late(sight: DiagnosticEvidence) -> bool:
-    return bool(sight.heard.late) and not sight.heard.answered
+    return bool(sight.heard.late) and not sight.heard.answered and not _has_values(sight)
 
 
 def _silent(sight: DiagnosticEvidence) -> bool:
@@ -151,10 +165,16 @@ def _silent(sight: DiagnosticEvidence) -> bool:
     return bool(heard.requested) and heard.nothing and not heard.echoed
 
 
+_NEIGHBORS_ANSWER = (
+    "No device answers at address {device}, while address {others} on this line does.",
+    "No device answers at address {device}, while addresses {others} on this line do.",
+)
+
+
 def _says_silent(sight: DiagnosticEvidence) -> str:
     if sight.neighbors:
-        others = ", ".join(map(str, sight.neighbors))
-        return f"No device answers at address {sight.device}, while {others} on this line does."
+        others = all_of([str(neighbor) for neighbor in sight.neighbors])
+        return counted(len(sight.neighbors), *_NEIGHBORS_ANSWER, device=sight.device, others=others)
     return f"No device answers at address {sight.device}: not one byte came back."
 
 
@@ -183,7 +203,8 @@ def _gateway_codes(sight: DiagnosticEvidence) -> list[int]:
 
 
 def _refused(sight: DiagnosticEvidence) -> bool:
-    return bool(sight.heard.exceptions) and not sight.heard.answered and not _gateway_codes(sight)
+    refused = bool(sight.heard.exceptions) and not sight.heard.answered
+    return refused and not _has_values(sight) and not _gateway_codes(sight)
 
 
 _REFUSES = "The drive is there, and refuses what is asked with exception {code}."
@@ -199,11 +220,10 @@ def _says_refused(sight: DiagnosticEvidence) -> str:
 
 
 _OTHER_FUNCTION = (
-    "Address {sight.device} answers something else than asked: function {sight.heard.functions[0]}."
+    "Address {sight.device} sent an unexpected reply: function {sight.heard.functions[0]}."
 )
 _OTHER_COUNT = (
-    "Address {sight.device} answers something else than asked: not as many registers as were asked"
-    " for."
+    "Address {sight.device} sent an unexpected reply: not the requested number of registers."
 )
 
 LADDER: tuple[Check, ...] = (
@@ -238,7 +258,7 @@ LADDER: tuple[Check, ...] = (
     Check(
         "late",
         _late,
-        lambda s: f"Address {s.device} answers, but after the time that is waited for it.",
+        lambda s: f"Address {s.device} answers, but after the timeout.",
         steps.wait_longer,
     ),
     Check(
@@ -272,6 +292,14 @@ LADDER: tuple[Check, ...] = (
         steps.ask_gateway,
     ),
     Check("exception", _refused, _says_refused, steps.ask_otherwise),
+    Check(
+        "other-master",
+        lambda s: bool(s.loose),
+        lambda s: Overheard(loose=s.loose).text,
+        steps.find_sender,
+        lambda _: POSSIBLE,
+        (NOISE_CAUSE,),
+    ),
 )
 """All checks, in the order in which they are tried; each test but the first ones' works alone."""
 
@@ -322,7 +350,7 @@ def diagnosed(sight: DiagnosticEvidence) -> Diagnosis:
     if sight.turnaround:
         text = (
             f"Address {sight.device} answers: {answered} of {sent} requests,"
-            f" {sight.turnaround * 1000:.0f} ms after each request."
+            f" usually {sight.turnaround * 1000:.0f} ms after a request."
         )
     if sight.idle:
         text = f"{text} The gateway kept the connection for {sight.idle:.0f} s without a request."

@@ -56,6 +56,8 @@ class DiagnosticEvidence:
     """Usual time in seconds from the end of a request to the start of its answer."""
     overheard: str = ""
     """Another master on the line, as a sentence; empty if none was detected."""
+    loose: int = 0
+    """Bytes without a frame that came before the first request, if no frame of a master came."""
     measure: Measure | None = None
     """Shares of faulty frames among many reads; None if the drive was not read often enough."""
     works: Works | None = None

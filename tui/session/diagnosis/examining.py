@@ -12,7 +12,7 @@ from functools import partial
 from math import ceil, log
 
 from tui.bus.api import DeviceCounters, LineCounters, LineStatus, ModbusLine
-from tui.bus.errors import ONE_BEHIND, LineError, LineLost
+from tui.bus.errors import ONE_BEHIND, LineError, LineLost, RequestRefused
 from tui.bus.line_events import LineEvent, StateChanged
 from tui.bus.link import SerialLink, TcpLink
 from tui.drive.errors import DriveError
@@ -22,7 +22,7 @@ from tui.drive.profile.profile import Profile
 from ..clock import REAL_CLOCK
 from ..connect.identify import DriveIdentity, identify_drive
 from ..connect.limits import limits_of
-from ..connect.other_masters import LISTEN, overheard
+from ..connect.other_masters import LISTEN, Overheard, overheard
 from .asking import FRAMES_COME_WITHIN, evidence_of_port, last_time, sight_of_drive
 from .evidence import DiagnosticEvidence
 from .gateway_probe import GATEWAY_REFUSALS, gateway_codes, probed
@@ -32,6 +32,11 @@ from .short_reads import ShortReads
 SHORT_READS = 200
 MEASURE_WITHIN = 6.0
 """Seconds that the reads may take."""
+TRAFFIC = 8
+"""Bytes without a frame from which nothing is sent: the length of the shortest read.
+
+A master at another baud sends at least so many while it is monitored. Fewer are probably noise.
+"""
 EXCLUDED, RISK = 0.02, 0.05
 """Share of faulty replies that makes a line poor, and the risk of missing it after good reads
 only."""
@@ -43,6 +48,7 @@ PAUSED_READS, PAUSE, PAUSED_WITHIN = 16, 0.1, 4.0
 and their time limit, both in s."""
 RECONNECTED_WITHIN = 3.0
 """Seconds within which a gateway accepts a new connection."""
+CLOSED_MEANWHILE = "The line was closed during the reads."
 IDLE = 3.0
 """Seconds without a request after which it shows whether a gateway closes idle connections."""
 
@@ -81,9 +87,29 @@ async def _examined(
     behind: Sequence[bool],
 ) -> DiagnosticEvidence:
     ready = line.state.status is LineStatus.CONNECTED
-    if ready and not isinstance(line.link, TcpLink) and (others := await _others(line)):
+    others = Overheard()
+    if ready and not isinstance(line.link, TcpLink):
+        others = await _others(line)
+    loose = 0 if others.has_frames or not others.text else others.loose
+    if others.has_frames or loose >= TRAFFIC:
         seen = await asyncio.to_thread(evidence_of_port, line.link, device)
-        return replace(seen, profile=profile, changed=changed, overheard=others)
+        return replace(seen, profile=profile, changed=changed, overheard=others.text, loose=loose)
+    sight = await _requested(line, device, profile, changed, answering, reads, behind, ready=ready)
+    return replace(sight, loose=loose)
+
+
+async def _requested(
+    line: ModbusLine,
+    device: int,
+    profile: Profile | None,
+    changed: str,
+    answering: Sequence[int],
+    reads: int,
+    behind: Sequence[bool],
+    *,
+    ready: bool,
+) -> DiagnosticEvidence:
+    """Return the evidence from requests; `ready` is True if the line was open before."""
     sight = await sight_of_drive(line, device, profile, changed=changed, neighbors=answering)
     cut = isinstance(sight.trouble, LineLost) and ready
     if cut and not isinstance(line.link, SerialLink) and await _connected_again(line):
@@ -102,14 +128,21 @@ async def _examined(
     return sight
 
 
-async def _others(line: ModbusLine) -> str:
-    """Return another master detected before the first request, as a sentence; empty for none."""
+async def _others(line: ModbusLine) -> Overheard:
+    """Return the traffic of another master before the first request."""
     since = last_time(line.trace)
     await REAL_CLOCK.sleep(LISTEN)
-    heard = overheard(line.trace, since)
-    ours = any(frame.direction == "out" and frame.time > since for frame in line.trace)
+    heard, ours = overheard(line.trace, since), _has_sent(line, since)
+    if heard.text and not heard.has_frames and not ours:
+        # a master sends as much again in the same time; noise comes at random
+        await REAL_CLOCK.sleep(LISTEN)
+        heard, ours = overheard(line.trace, since), _has_sent(line, since)
     # late replies and noise around polls of this computer are not traffic of another master
-    return heard.text if heard.requests or not ours else ""
+    return heard if heard.requests or not ours else Overheard()
+
+
+def _has_sent(line: ModbusLine, since: float) -> bool:
+    return any(frame.direction == "out" and frame.time > since for frame in line.trace)
 
 
 async def _measured(line: ModbusLine, sight: DiagnosticEvidence, reads: int) -> DiagnosticEvidence:
@@ -125,22 +158,37 @@ async def _measured(line: ModbusLine, sight: DiagnosticEvidence, reads: int) -> 
         unreached=gateway_codes(profile),
     )
     clean = clean_reads(line.counters, device)
-    short = await _read(line, device, profile, reads, MEASURE_WITHIN, clean=clean)
+    short = last = await _read(line, device, profile, reads, MEASURE_WITHIN, clean=clean)
     measure = count(short.frames, seconds=short.seconds)
     measure.turns = short.turns
     measure.swapped, measure.straight = short.swapped
     if measure.second or measure.duplicated:
-        paused = await _read(line, device, profile, PAUSED_READS, PAUSED_WITHIN, PAUSE)
-        measure.decide(count(paused.frames))
+        last = await _read(line, device, profile, PAUSED_READS, PAUSED_WITHIN, PAUSE)
+        measure.decide(count(last.frames))
+    sight = _with_end(line, sight, short.ended or last.ended)
+    idle = 0.0
+    if not isinstance(line.link, SerialLink) and sight.trouble is None:
+        idle = IDLE
     others = overheard(line.trace, since)
     return replace(
         sight,
         identity=identity,
         measure=measure,
         overheard=others.text if others.requests else "",
-        idle_closed=not isinstance(line.link, SerialLink) and await _closes_idle(line),
-        idle=0.0 if isinstance(line.link, SerialLink) else IDLE,
+        idle_closed=bool(idle) and await _closes_idle(line),
+        idle=idle,
     )
+
+
+def _with_end(
+    line: ModbusLine, sight: DiagnosticEvidence, ended: LineError | None
+) -> DiagnosticEvidence:
+    """Return the evidence with the reason if the reads ended early, or if the line is lost now."""
+    if isinstance(ended, RequestRefused):
+        return replace(sight, withheld=str(ended))
+    if ended is None and line.state.status is not LineStatus.CONNECTED:
+        ended = LineLost(line.state.reason or CLOSED_MEANWHILE)
+    return replace(sight, trouble=ended)
 
 
 def clean_reads(counted: LineCounters, device: int) -> int:

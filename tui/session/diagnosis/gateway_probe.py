@@ -16,7 +16,7 @@ from tui.bus.link import ONLY_UNITS, RtuTcpLink, TcpLink, label
 from tui.drive.profile.profile import Profile
 from tui.wire.frames import frame, is_whole
 
-from .reply_evidence import REFUSED, TCP_HEAD
+from .reply_evidence import REFUSED, TCP_HEAD, is_whole_tcp
 
 WITHIN = 1.0
 """Seconds each for the connection and for the reply."""
@@ -47,12 +47,16 @@ def _answers_rtu(data: bytes, unit: int) -> bool:
     return data[:1] == bytes([unit]) and is_whole(data)
 
 
+def _speaks_tcp(data: bytes, unit: int) -> bool:
+    """True for a whole message to a unit; a gateway that misses its drive speaks TCP, too."""
+    own = data[:2] == TRANSACTION.to_bytes(2, "big")
+    return own and data[TCP_HEAD : TCP_HEAD + 1] == bytes([unit]) and is_whole_tcp(data)
+
+
 def _answers_tcp(data: bytes, unit: int) -> bool:
-    right = data[:2] == TRANSACTION.to_bytes(2, "big") and data[TCP_HEAD : TCP_HEAD + 1] == bytes(
-        [unit]
-    )
     refused = len(data) > TCP_HEAD + 2 and data[TCP_HEAD + 1] & REFUSED
-    return right and not (refused and data[TCP_HEAD + 2] in GATEWAY_REFUSALS)
+    missed = refused and data[TCP_HEAD + 2] in GATEWAY_REFUSALS
+    return _speaks_tcp(data, unit) and not missed
 
 
 def gateway_codes(profile: Profile | None) -> frozenset[int]:
@@ -86,7 +90,7 @@ async def probed(line: ModbusLine, device: int, *, beside: bool = True) -> Works
     over_rtu = Works(label(RtuTcpLink(link.host, link.port)))
     over_tcp = Works(label(TcpLink(link.host, link.port)))
     rtu = (frame(device, ANY_REGISTER), device, _answers_rtu, over_rtu)
-    own = (_message(device), device, _answers_tcp, over_tcp)
+    own = (_message(device), device, _speaks_tcp, over_tcp)
     unit = (_message(NO_UNIT), NO_UNIT, _answers_tcp, _by_unit(link, NO_UNIT))
     for request, named, answers, works in [rtu, unit] if isinstance(link, TcpLink) else [own]:
         if await _answered(link, request, lambda data, a=answers, u=named: a(data, u)):  # type: ignore[misc]

@@ -9,9 +9,18 @@ from statistics import median
 from tui.bus.trace import Frame
 from tui.wire.frames import is_whole
 
-from .reply_evidence import LATE_NOTE, REFUSED, REGISTER_READS, TCP_HEAD, due_bytes
+from .reply_evidence import (
+    LATE_NOTE,
+    REFUSED,
+    REGISTER_READS,
+    TCP_HEAD,
+    due_bytes,
+    is_whole_tcp,
+)
 
-SICK_KINDS = ("late", "lost", "damaged", "duplicated", "foreign", "unreached")
+SICK_KINDS = (
+    "late", "lost", "damaged", "duplicated", "surplus", "foreign", "unreached", "stray",
+)  # fmt: skip
 DAMAGED_NOTE = "damaged"
 TURNS = 2
 """Number of second replies, or of returns of a setting to an earlier value, that indicates two
@@ -33,6 +42,8 @@ class Measure:
 
     requested: int = 0
     answered: int = 0
+    refused: int = 0
+    """Number of `answered` requests whose reply was an exception."""
     lost: int = 0
     damaged: int = 0
     late: int = 0
@@ -44,6 +55,10 @@ class Measure:
     """Replies that match the previous request, and not their own."""
     second: int = 0
     """Second replies to one request with different content."""
+    surplus: int = 0
+    """Second replies with other content that are not known to be copies or a second drive's."""
+    stray: int = 0
+    """Intact replies with bytes before or after them that form no frame."""
     turns: int = 0
     """Times that a setting returned to an earlier value."""
     seconds: float = 0.0
@@ -66,7 +81,13 @@ class Measure:
     @property
     def two_drives(self) -> bool:
         """True if two drives reply in turn, each with its own values."""
-        return self.second >= TURNS or (self.turns >= TURNS and self.damaged >= TURNS)
+        collided = self.damaged + self.stray
+        return self.second >= TURNS or (self.turns >= TURNS and collided >= TURNS)
+
+    @property
+    def has_values(self) -> bool:
+        """True if a reply was not an exception."""
+        return self.answered > self.refused
 
     @property
     def one_behind(self) -> bool:
@@ -81,8 +102,12 @@ class Measure:
         """
         if paused.second >= TURNS:
             self.second = paused.second
+            return
+        second, self.second = max(self.second, paused.second), 0
+        if not paused.second and (self.duplicated or paused.duplicated):
+            self.duplicated += second
         else:
-            self.duplicated, self.second = self.duplicated + self.second, 0
+            self.surplus = second
 
 
 @dataclass(slots=True)
@@ -96,6 +121,9 @@ class _Exchange:
     sick: bool = False
     """True if bytes arrived, but no valid reply."""
     damaged: bool = False
+    """True if bytes outside any frame arrived."""
+    broken: bool = False
+    """True if the reply itself was damaged."""
     older: str = ""
     """Kind of an immediate reply to the previous request, unless all replies are one behind."""
 
@@ -123,10 +151,10 @@ def measure_of(
             ours = body[:1] == bytes([device]) and not (echoes and body[1] == DIAGNOSE)
             if ours:
                 exchanges.append(_Exchange(body, frame.time, frame.data[: TRANSACTION_BYTES * tcp]))
-        elif not ours or (tcp and len(body) < 2) or _is_echo(frame, body, exchanges[-1]):
+        elif not ours or _is_echo(frame, body, exchanges[-1]):
             continue
-        elif not tcp and not is_whole(frame.data):
-            _loose(found, exchanges[-1], frame)
+        elif not (is_whole_tcp(frame.data) if tcp else is_whole(frame.data)):
+            _loose(exchanges[-1], frame)
         elif body[0] == device and body[1] & REFUSED and body[-1] in unreached:
             found.unreached += 1
             exchanges[-1].sick = True
@@ -149,6 +177,10 @@ def _end(found: Measure, exchange: _Exchange) -> None:
     """Count a completed exchange."""
     found.requested += 1
     found.answered += bool(exchange.replies)
+    found.refused += bool(exchange.replies) and bool(exchange.replies[0][1] & REFUSED)
+    if exchange.damaged:
+        kind = "damaged" if exchange.broken or not exchange.replies else "stray"
+        setattr(found, kind, found.count(kind) + 1)
     found.lost += not exchange.replies and not exchange.sick
     if exchange.older and (exchange.replies or exchange.damaged or exchange.older == "second"):
         setattr(found, exchange.older, found.count(exchange.older) + 1)
@@ -165,10 +197,10 @@ def _is_echo(frame: Frame, body: bytes, exchange: _Exchange) -> bool:
     return body == exchange.request and body[1:2] != bytes([DIAGNOSE])
 
 
-def _loose(found: Measure, exchange: _Exchange, frame: Frame) -> None:
-    """Count bytes outside any frame: one damaged reply for each run."""
-    found.damaged += 1
+def _loose(exchange: _Exchange, frame: Frame) -> None:
+    """Note bytes outside any frame: a damaged reply, or stray bytes beside an intact one."""
     exchange.damaged = True
+    exchange.broken = exchange.broken or frame.note == DAMAGED_NOTE
     if frame.note == DAMAGED_NOTE or not exchange.replies:
         exchange.sick = True
 

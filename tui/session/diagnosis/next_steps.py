@@ -271,6 +271,13 @@ def one_master(sight: DiagnosticEvidence) -> Iterator[str]:
     yield "Stop the other master, or join it: a line has one. drivepanel listen shows what it asks."
 
 
+def find_sender(sight: DiagnosticEvidence) -> Iterator[str]:
+    """Steps if bytes arrived before the first request, but no frame."""
+    yield "Run drivepanel listen: a master sends again and again, noise at random."
+    yield "Look at the polarization: without it, an idle line picks up noise."
+    yield from wiring_hints(sight)
+
+
 def open_what_works(sight: DiagnosticEvidence) -> Iterator[str]:
     """Steps if the gateway uses another protocol."""
     assert sight.works is not None
@@ -320,6 +327,12 @@ def end_copies(_sight: DiagnosticEvidence) -> Iterator[str]:
     yield "Switch the drive off and run why again: a reply shows a second drive at its address."
 
 
+def end_strays(sight: DiagnosticEvidence) -> Iterator[str]:
+    """Steps if bytes without a frame arrive beside intact replies."""
+    yield "Look at polarization, and termination at both ends alone: an idle line picks up noise."
+    yield from wiring_hints(sight, answers=True)
+
+
 SICK_STEPS = {
     "late": wait_longer,
     "lost": find_losses,
@@ -327,5 +340,7 @@ SICK_STEPS = {
     "duplicated": end_copies,
     "other-address": find_second_master,
     "gateway": ask_gateway,
+    "two-drives": part_drives,
+    "stray-bytes": end_strays,
 }
 """Next steps by the verdict on many reads."""

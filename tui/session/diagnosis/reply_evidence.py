@@ -37,7 +37,8 @@ class ReplyEvidence:
     others: tuple[int, ...] = ()
     """Addresses that answered instead of the drive, in order."""
     damaged: int = 0
-    """Answers with a correct beginning that fail their checksum or are cut short."""
+    """Answers with a correct beginning that fail their checksum or are cut short.
+    Over Modbus TCP, frames whose length does not fit."""
     garbage: int = 0
     """Number of bytes outside any frame."""
     compared: tuple[int, int] = (0, 0)
@@ -72,6 +73,12 @@ def evidence_of_frames(frames: Iterable[Frame], device: int, *, tcp: bool = Fals
     return _with(found, request, exchange, tcp)
 
 
+def is_whole_tcp(data: bytes) -> bool:
+    """True for a frame of Modbus TCP with as many bytes as its header says."""
+    length = int.from_bytes(data[TCP_HEAD - 2 : TCP_HEAD], "big")
+    return length > 1 and len(data) == TCP_HEAD + length and data[2:4] == b"\0\0"
+
+
 def _device(data: bytes, tcp: bool) -> int:
     at = TCP_HEAD if tcp else 0
     return data[at] if len(data) > at else -1
@@ -90,10 +97,12 @@ def _with(
         data = frame.data
         if not tcp and data == request:
             found = replace(found, echoed=found.echoed + 1)
-        elif len(data) > TCP_HEAD + 1 if tcp else is_whole(data):
+        elif is_whole_tcp(data) if tcp else is_whole(data):
             body = data[TCP_HEAD:] if tcp else data[:-2]
             found = _with_whole(found, requested, body, late=frame.note.startswith(LATE_NOTE))
             alone = False
+        elif tcp:
+            found = replace(found, damaged=found.damaged + 1)
         else:
             loose += data
     return _with_loose(found, requested, loose, alone=alone)

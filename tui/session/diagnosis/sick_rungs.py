@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from tui.bus.errors import ONE_BEHIND
+from tui.bus.link import TcpLink
 from tui.drive.sentences import sentence
 
 from . import next_steps as steps
@@ -37,6 +38,8 @@ class SickFrames:
     rung: str
     text: str
     others: tuple[str, ...]
+    tcp_text: str = ""
+    """Text over Modbus TCP if it differs."""
 
     def fails(self, sight: DiagnosticEvidence) -> bool:
         """True if most faulty frames are of this kind."""
@@ -60,10 +63,15 @@ SICK_FRAMES = (
     SickFrames(
         "damaged", "checksum", "replies came damaged: the checksum does not fit",
         ("Two drives have this address.", "Another master is on the line."),
+        "replies came damaged: their length does not fit",
     ),
     SickFrames(
         "duplicated", "duplicated", "replies came twice",
         ("Two drives with the same values have this address.",),
+    ),
+    SickFrames(
+        "surplus", "two-drives", "requests got a second reply with other values",
+        ("Something on the way doubles the replies.",),
     ),
     SickFrames(
         "foreign", "other-address", "replies carried another address",
@@ -72,6 +80,10 @@ SICK_FRAMES = (
     SickFrames(
         "unreached", "gateway", "requests got exception 0A or 0B: the gateway missed the drive",
         ("The drive does not hear each request.", "Two drives have this address."),
+    ),
+    SickFrames(
+        "stray", "stray-bytes", "replies came intact, but with stray bytes before or after them",
+        ("Another device sends on this line.", "The adapter adds bytes as it changes direction."),
     ),
 )  # fmt: skip
 
@@ -85,7 +97,8 @@ def says_sick(kind: SickFrames, sight: DiagnosticEvidence) -> str:
         for frame in SICK_FRAMES
         if frame is not kind and measure.count(frame.kind)
     ]
-    text = f"In {measure.seconds:.1f} s, {count} of {measure.requested} {kind.text}"
+    fault = kind.tcp_text if kind.tcp_text and isinstance(sight.link, TcpLink) else kind.text
+    text = f"In {measure.seconds:.1f} s, {count} of {measure.requested} {fault}"
     return f"{text}; also {', '.join(beside)}." if beside else f"{text}."
 
 
@@ -94,7 +107,8 @@ def says_two_drives(sight: DiagnosticEvidence) -> str:
     measure = _measure(sight)
     return (
         f"Two drives have address {sight.device}: {measure.requested} requests got"
-        f" {measure.second} second replies with other values and {measure.damaged} damaged ones."
+        f" {measure.second} second replies with other values and"
+        f" {measure.damaged + measure.stray} damaged ones."
     )
 
 
@@ -169,12 +183,15 @@ def _sureness_of_behind(sight: DiagnosticEvidence) -> str:
     return POSSIBLE if count.late else sureness(count.behind)
 
 
+NOISE_CAUSE = "An idle line picks up noise: its polarization is missing."
 GATEWAY_RUNGS = (
     Check(
         "other-master",
         lambda s: bool(s.overheard),
         lambda s: first_sentence(s.overheard),
-        steps.one_master,
+        lambda s: steps.find_sender(s) if s.loose else steps.one_master(s),
+        lambda s: LIKELY if s.loose else CERTAIN,
+        (NOISE_CAUSE,),
     ),
     Check(
         "wrong-protocol",
