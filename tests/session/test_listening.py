@@ -89,7 +89,7 @@ BOTH_REPLY = reply_words(2, 0x0637, 425, function=23)
         ((write_frame(2, 8501, [6, 425]), frame(2, bytes.fromhex("1021350002"))),
          "  2 write  CMD ← 16#0006 · LFR ← 42.5 Hz"),
         ((BOTH, BOTH_REPLY), "  2 read and write CMD ← 16#0006 · ETA 16#0637 · RFR 42.5 Hz"),
-        ((READ, REFUSED), "  2 read   ETA RFR: exception 2,"),
+        ((READ, REFUSED), "  2 read   ETA RFR: exception 2. None"),
         ((READ,), "  2 read   ETA RFR: no answer"),
         ((READ, b"\x07\x07"), "  2 read   ETA RFR: damaged answer"),
         ((read_frame(2, 1, 1), reply_words(2, 7)), "  2 read   1 16#0007"),
@@ -264,13 +264,33 @@ def test_pause_in_progress_counts() -> None:
 
 def test_timeout_that_starts_with_a_command_is_inactive_before() -> None:
     heard = Heard(named("atv71", "atv71")).say(READ, WORDS)
-    assert "starts with the first command, and none was sent yet" in heard.lines
+    assert "starts with the first command; none was heard while listening" in heard.lines
+    assert "it has expired" not in heard.lines
+    assert "If one was sent before, it has expired" in heard.rest(11.0).lines
 
 
 def test_unanswered_request_does_not_restart_the_timeout() -> None:
     heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
     cycle(heard, 6, READ, every=2.0)
-    assert "NOT POLLED" in heard.lines
+    assert "NO ANSWERED REQUEST for" in heard.lines
+    assert "longest pause 2.0" in heard.lines
+
+
+def test_damaged_reply_restarts_the_timeout() -> None:
+    heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
+    cycle(heard, 3, READ, WORDS[:4], every=3.0)
+    assert "polled in time" in heard.lines
+
+
+def test_unread_timeout_is_named_beside_one_that_is_off() -> None:
+    profile = library.load("powerdrive")
+    rules = profile.data.communication_fault
+    assert rules is not None
+    off, other = profile[rules.timeout], rules.other_timeouts[0]
+    heard = Heard(named("powerdrive", "powerdrive")).say(READ, WORDS)
+    heard.say(read_frame(2, off.address, 1), reply_words(2, rules.off or 0))
+    assert f"no master has read {other}" in heard.lines
+    assert "does not react" not in heard.lines
 
 
 @pytest.mark.parametrize(("waited", "answers"), [(0.6, ["none"]), (0.2, [])])
@@ -288,7 +308,7 @@ def test_two_drives_at_one_address_are_reported() -> None:
 def test_exceptions_and_silence_are_reported() -> None:
     heard = Heard(named("atv71", "atv71")).say(READ, WORDS, READ, REFUSED, READ, REFUSED)
     heard.say(read_frame(9, 3201, 1)).rest()
-    assert "refused 2 times: exception 2, " in heard.lines
+    assert "refused 2 times with exception 2: " in heard.lines
     assert "Device 9: family unknown; name it with -p\n  no answer to 1 request" in heard.lines
 
 

@@ -196,7 +196,7 @@ def _drive_field(drive: DriveSummary) -> HeardDriveField:
         **_family_fields(drive.family),
         requests=tally.requests,
         per_second=None if drive.pace is None else round(drive.pace, 3),
-        longest_pause=round(tally.longest_pause, 3),
+        longest_pause=round(tally.longest_gap, 3),
         answered=tally.answered,
         unanswered=tally.answers["none"],
         damaged=tally.answers["damaged"],

@@ -21,7 +21,15 @@ MOST_ROWS = 6
 """Maximum rows of one sentence."""
 OF_A_DRIVE, HANGING = 3, 5
 """Indent in columns of a sentence about a drive, and of the further rows of any sentence."""
-WARNINGS = ("NOT POLLED", "TWO ANSWERS", "A SECOND MASTER", "no answer", "damaged", "Broken")
+WARNINGS = (
+    "NOT POLLED",
+    "NO ANSWERED REQUEST",
+    "TWO ANSWERS",
+    "A SECOND MASTER",
+    "no answer",
+    "damaged",
+    "Broken",
+)
 """Phrases that put their sentence in the alarm color."""
 
 

@@ -89,8 +89,13 @@ class DriveTally:
     turnaround_least: float = float("inf")
     turnaround_most: float = 0.0
     fed: float | None = None
-    """Time of its last request and answer, which restart its timeout."""
+    """Time of its last request with a reply, damaged or not, which restarts its timeout."""
     longest_pause: float = 0.0
+    """Longest time between two such requests, in seconds."""
+    longest_gap: float = 0.0
+    """Longest time between two requests, answered or not, in seconds."""
+    measured: int = 0
+    """Number of replies with a known turnaround."""
 
     @property
     def commanded(self) -> bool:
@@ -104,12 +109,16 @@ class DriveTally:
 
     @property
     def turnaround(self) -> float | None:
-        """Mean seconds; None if the drive answered nothing."""
-        return self.turnaround_sum / self.answered if self.answered else None
+        """Mean seconds; None if no turnaround was measured."""
+        return self.turnaround_sum / self.measured if self.measured else None
 
     def pause_until(self, now: float) -> float:
-        """Return the longest pause in polling, including the present one, in seconds."""
+        """Return the longest time without an answered request, until now, in seconds."""
         return max(self.longest_pause, now - self.fed if self.fed is not None else 0.0)
+
+    def gap_until(self, now: float) -> float:
+        """Return the longest time without a request, until now, in seconds."""
+        return max(self.longest_gap, now - self.last if self.requests else 0.0)
 
     def take(
         self, exchange: ObservedExchange, values: Sequence[ObservedValue], profile: Profile | None
@@ -118,20 +127,24 @@ class DriveTally:
         self.answers[exchange.answer] += 1
         if exchange.answer in ("again", "unasked"):
             return
+        if self.requests:
+            self.longest_gap = max(self.longest_gap, exchange.time - self.last)
         self.requests += 1
         self.last = exchange.time
         if exchange.exception is not None:
             self.exceptions[exchange.exception] += 1
         if exchange.turnaround is not None:
+            self.measured += 1
             self.turnaround_sum += exchange.turnaround
             self.turnaround_least = min(self.turnaround_least, exchange.turnaround)
             self.turnaround_most = max(self.turnaround_most, exchange.turnaround)
+        if _has_reached(exchange):
             if self.fed is not None:
                 self.longest_pause = max(self.longest_pause, exchange.time - self.fed)
             self.fed = exchange.time
         self._take_reads(exchange)
         for value in values:
-            self._take_value(value, exchange.time, profile)
+            self._take_value(value, exchange.time, profile, confirmed=not exchange.has_other_echo)
 
     def _take_reads(self, exchange: ObservedExchange) -> None:
         for span in spans_of(exchange.request):
@@ -141,8 +154,10 @@ class DriveTally:
             read.times += 1
             read.last = exchange.time
 
-    def _take_value(self, value: ObservedValue, time: float, profile: Profile | None) -> None:
-        if value.parameter is not None:
+    def _take_value(
+        self, value: ObservedValue, time: float, profile: Profile | None, *, confirmed: bool
+    ) -> None:
+        if value.parameter is not None and confirmed:
             self.raws[value.code] = value.raw
         if not value.written:
             return
@@ -152,6 +167,12 @@ class DriveTally:
         write = self.writes[value.code]
         write.times += 1
         write.last, write.text, write.raw = time, value.value.display, value.raw
+
+
+def _has_reached(exchange: ObservedExchange) -> bool:
+    """True if the drive replied; noise counts only if it begins as its reply."""
+    replied = exchange.noise[:1] == bytes([exchange.device])
+    return exchange.answer in ("ok", "exception") or (exchange.answer == "damaged" and replied)
 
 
 def decides(profile: Profile | None, parameter: Parameter | None) -> bool:

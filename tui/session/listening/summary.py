@@ -10,7 +10,7 @@ from tui.bus.limits import STANDARD_EXCEPTIONS
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
-from tui.drive.sentences import counted, first_of
+from tui.drive.sentences import any_of, counted, first_of
 from tui.drive.shown import number_of
 
 from . import summary_texts as texts
@@ -142,7 +142,7 @@ def _drive_request_text(drive: DriveSummary) -> str:
     text = "polled once"
     if drive.pace is not None:
         text = texts.POLLED_OFTEN_TEXT if drive.pace >= 1 else texts.POLLED_SELDOM_TEXT
-        text = text.format(pace=drive.pace, cycle=1 / drive.pace, longest=tally.longest_pause)
+        text = text.format(pace=drive.pace, cycle=1 / drive.pace, longest=tally.longest_gap)
     if tally.turnaround is None:
         return text
     least, most = tally.turnaround_least * 1000, tally.turnaround_most * 1000
@@ -169,27 +169,31 @@ def _writes_text(writes: dict[str, WriteTally]) -> str:
 
 def feeding_text(feeding: Feeding) -> str:
     """Return a text on a drive's timeout: whether polling prevents it, and with what margin."""
-    heard = feeding.known == "heard"
+    known = "as read on the line"
+    if feeding.known != "heard":
+        known = "factory setting; no master has read it"
+    elif feeding.unread:
+        known = f"as read on the line; no master has read {any_of(feeding.unread)}"
     if feeding.seconds is None or feeding.margin is None:
-        if not heard:
-            return f"timeout {feeding.code} off (factory setting; no master has read it)"
-        return (
-            f"timeout {feeding.code} off (as read on the line): it does not react to a"
-            " communication loss"
-        )
-    known = "as read on the line" if heard else "factory setting; no master has read it"
+        text = f"timeout {feeding.code} off ({known})"
+        if feeding.known != "heard" or feeding.unread:
+            return text
+        return f"{text}: it does not react to a communication loss"
     head = f"timeout {feeding.code} {feeding.seconds:g} s ({known})"
     if not feeding.begun:
-        return f"{head}: starts with the first command, and none was sent yet"
+        text = f"{head}: starts with the first command; none was heard while listening"
+        return text if feeding.fed else f"{text}. If one was sent before, it has expired"
     if feeding.fed:
         return f"{head}: polled in time, {feeding.margin:.2f} s to spare"
+    if feeding.polled:
+        return f"{head}: NO ANSWERED REQUEST for {feeding.longest_pause:.2f} s"
     return f"{head}: NOT POLLED for {feeding.longest_pause:.2f} s"
 
 
 def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str]:
     tally = drive.tally
     for code, times in sorted(tally.exceptions.items()):
-        meaning = exception_meaning(code, profile)
+        meaning = exception_meaning(code, profile).removesuffix(".")
         yield counted(times, *texts.REFUSED_TIMES_TEXTS, code=code, meaning=meaning)
     if tally.answers["none"] and not drive.silent:
         yield counted(tally.answers["none"], "no answer once", "no answer {count} times")
@@ -307,6 +311,11 @@ class Feeding:
     begun: bool
     """False if it begins with a first command, and none was observed."""
     longest_pause: float
+    """Longest time without an answered request."""
+    polled: bool = False
+    """True if requests without a reply were sent in that time."""
+    unread: tuple[str, ...] = ()
+    """Other timeouts of the drive that no master has read, if one was read."""
 
     @property
     def margin(self) -> float | None:
@@ -339,7 +348,10 @@ def feeding(profile: Profile, drive: DriveTally, now: float) -> Feeding | None:
     seconds, code = shortest if shortest is not None else (None, next(iter(raws)))
     begun = drive.commanded or not rules.needs_write
     pause = drive.pause_until(now)
-    return Feeding(code, seconds, "heard" if heard else "factory", begun, pause)
+    unread = tuple(code for code in codes if code not in heard) if heard else ()
+    known: Literal["heard", "factory"] = "heard" if heard else "factory"
+    polled = bool(drive.requests) and drive.gap_until(now) < pause
+    return Feeding(code, seconds, known, begun, pause, polled, unread)
 
 
 def _seconds(profile: Profile, code: str, raw: int, off: int | None) -> float | None:

@@ -14,8 +14,8 @@ NO_FRAME_TEXTS = (
 POLLED_OFTEN_TEXT = "polled {pace:.1f} times a second, longest pause {longest:.2f} s"
 POLLED_SELDOM_TEXT = "polled every {cycle:.1f} s, longest pause {longest:.2f} s"
 REFUSED_TIMES_TEXTS = (
-    "refused once: exception {code}, {meaning}",
-    "refused {count} times: exception {code}, {meaning}",
+    "refused once with exception {code}: {meaning}.",
+    "refused {count} times with exception {code}: {meaning}.",
 )
 DAMAGED_TEXTS = (
     "damaged answer once: noise, or several devices with the address {device}",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tui.drive.plain import plain
-from tui.drive.sentences import first_of
+from tui.drive.sentences import capitalized, first_of, sentence
 
 from .families import Families
 from .listener import DecodedExchange
@@ -13,6 +13,8 @@ from .words import FUNCTION_NAMES, WHO, ObservedValue, names_of_words, spans_of
 CODES_NAMED_AT_MOST = 4
 """Number of parameters of a request that are named if it returned no values."""
 FUNCTION_WIDTH = 6
+ECHO_AT = 3
+"""Offset of the value in the echo of a write, from the function byte on."""
 
 
 def function_name(function: int) -> str:
@@ -40,7 +42,11 @@ def _what(reported: DecodedExchange, families: Families) -> str:
         case "ok" | "broadcast":
             if exchange.function == WHO:
                 return _identity_text(exchange.device, families)
-            return " · ".join(map(_value_text, reported.values))
+            text = " · ".join(map(_value_text, reported.values))
+            if exchange.has_other_echo:
+                other = f"answered 16#{exchange.reply[ECHO_AT:].hex().upper()}"
+                text = f"{text}, {other}" if text else other
+            return text
         case "again":
             return "a second answer to the same request: two devices at one address?"
         case "unasked":
@@ -53,7 +59,7 @@ def _trouble(reported: DecodedExchange) -> str:
     exchange = reported.exchange
     if exchange.exception is not None:
         meaning = exception_meaning(exchange.exception, reported.profile)
-        return f"exception {exchange.exception}, {meaning}"
+        return f"exception {exchange.exception}. {sentence(capitalized(meaning))}"
     return "damaged answer" if exchange.answer == "damaged" else "no answer"
 
 

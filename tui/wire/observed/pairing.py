@@ -38,7 +38,8 @@ class ObservedExchange:
     request: bytes = b""
     reply: bytes = b""
     turnaround: float | None = None
-    """Seconds from the end of the request to the beginning of the reply."""
+    """Seconds from the end of the request to the beginning of the reply; None if both were read at
+    once."""
     noise: bytes = b""
     """Bytes after the request that form no frame."""
     waited: float | None = None
@@ -48,6 +49,12 @@ class ObservedExchange:
     def exception(self) -> int | None:
         """Exception code of the reply; None if it is not an exception."""
         return self.reply[-1] if self.answer == "exception" else None
+
+    @property
+    def has_other_echo(self) -> bool:
+        """True if the reply to a write repeats the address, but another value."""
+        echoes = self.answer == "ok" and self.function in SAME_BOTH_WAYS
+        return echoes and self.reply != self.request
 
 
 @dataclass(slots=True)
@@ -113,7 +120,7 @@ class Pairing:
                 "exception" if refused else "ok",
                 requested.frame.pdu,
                 frame.pdu,
-                max(0.0, frame.begun - requested.frame.ended),
+                None if frame.pause is None else max(0.0, frame.begun - requested.frame.ended),
                 requested.noise,
             )
         )
