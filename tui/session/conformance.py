@@ -6,7 +6,7 @@ range. The display alone proves the meaning of a value, and only a person sees i
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal
 from functools import partial
@@ -50,6 +50,9 @@ COMPARED_QUANTITIES: tuple[Quantity, ...] = (
 """Quantities that a display shows and that are seldom 0, in the order in which they are asked."""
 QUESTIONS_AT_MOST = 8
 """Values that a person is asked about, unless they are named."""
+MOVED_AT_MOST = Decimal("0.1")
+"""Share of a value by which it may move during a question. Else a display between the two reads
+shows nothing about its scale."""
 FROM_A_MANUAL: frozenset[Confidence] = frozenset({"site", "manual", "manual+public"})
 
 AskDisplay = Callable[[Parameter], Awaitable[str]]
@@ -102,11 +105,8 @@ class Conformance:
             finding = self._finding(parameter, "open", "The display was not compared.")
         else:
             seen = [raw for raw in (before, await self._read(code)) if raw is not None]
-            agreeing = [raw for raw in seen if self._agrees(parameter, raw, typed)]
+            result = self._compare(parameter, seen, typed)
             values = ", ".join(dict.fromkeys(self._text(parameter, raw) for raw in seen))
-            result: EvidenceResult = "confirmed" if agreeing else "contradicted"
-            if not seen or (not any(agreeing) and agreeing and not is_enumeration(parameter)):
-                result = "open"  # without a value, or with 0, which agrees with every scale
             raws = ", ".join(dict.fromkeys(map(str, seen)))
             text = f"Display {typed}, read {values} (raw {raws})."
             if not seen:
@@ -123,6 +123,34 @@ class Conformance:
             subject="value", name=parameter.code, statement=statement, result=result, seen=seen
         )
 
+    def _compare(self, parameter: Parameter, seen: Sequence[int], typed: str) -> EvidenceResult:
+        """Compare the display with the reads before and after it, between which a value may move.
+
+        Raises ValueRefused as `_agrees`.
+        """
+        agreeing = [raw for raw in seen if self._agrees(parameter, raw, typed)]
+        if agreeing:
+            # 0 agrees with every scale
+            return "confirmed" if any(agreeing) or is_enumeration(parameter) else "open"
+        if not seen:
+            return "open"
+        if is_enumeration(parameter):
+            return "open" if len(set(seen)) > 1 else "contradicted"
+        image, profile = self.session.image, self.session.profile
+        found = (number_of(profile, parameter, raw, image.raws, image.lacking) for raw in seen)
+        values = [value for value in found if value is not None]
+        number, unit = parse_display(typed)
+        if unit and parameter.unit and unit.casefold() != parameter.unit.casefold():
+            return "contradicted"
+        if not values:
+            return "open"
+        least, most = min(values), max(values)
+        if most - least > MOVED_AT_MOST * max(abs(least), abs(most)):
+            # it may have been beyond the two reads, too
+            moved = most - least
+            return "open" if least - moved <= number <= most + moved else "contradicted"
+        return "confirmed" if least < number < most else "contradicted"
+
     def _agrees(self, parameter: Parameter, raw: int, typed: str) -> bool:
         """Return True if a raw value means what was typed, to the decimals of the display.
 
@@ -135,8 +163,10 @@ class Conformance:
             known = {name.casefold(): value for value, name in names.items()}
             known |= {str(value): value for value in names}
             if typed.casefold() not in known:
+                choices = first_of([f"{value} {name}" for value, name in names.items()], 8)
                 raise ValueRefused(
-                    f"{typed!r} is not a value of {parameter.code}. Known: {first_of([*known], 8)}."
+                    f"{typed!r} is not a value of {parameter.code}. Use the number or the name of"
+                    f" one: {choices}."
                 )
             return known[typed.casefold()] == raw
         value = number_of(profile, parameter, raw, image.raws, image.lacking)
