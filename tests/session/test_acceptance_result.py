@@ -95,8 +95,8 @@ def test_result_passes_only_whole() -> None:
         (result("passed", "not run"), "Steps were not run."),
         (replace(whole, ended_by="ended by SIGINT"), "The test ended early: ended by SIGINT."),
         (replace(whole, settings_after="bb"), "Settings of the drive changed during the test."),
-        (replace(whole, settings_after=""), "The settings could not be read after the test."),
-        (replace(whole, settings_hash="", settings_after=""), "The settings could not be"),
+        (replace(whole, settings_after=""), "The settings were not read after the test."),
+        (replace(whole, settings_hash="", settings_after=""), "The settings were not"),
     ):
         assert not wrong.passed
         assert wrong.why_not.startswith(why)

@@ -74,7 +74,7 @@ def pages() -> Iterator[str]:
     """Pages of drives in several states, in each form."""
     profile = whole()
     tests = [
-        stored(7), stored(6, passed=False, why_not="Failed: step 2."), stored(5, passed=False),
+        stored(7), stored(6, passed=False, why_not="Failed: step 2."), stored(5, passed=False, settings_hash_after=None),
         stored(4, settings_hash_after="x"), stored(3, identity={"reference": "EXFAN-11"}),
         stored(2, device=8), stored(1, line="rtu:y"), stored(1, profile="other"),
         stored(9, name="Test 7"), stored(8), stored(10, identity={}), stored(11), stored(12),
@@ -236,7 +236,8 @@ def displays() -> Iterator[str]:
     typed = ("3.0", "3", "3.05", "3.1", "2,9 s", "3 Hz", "30", "-3", "0", "", "-", " 3.0 s ", "x",
              "terminals", "1", "50", "NAME")  # fmt: skip
     for name, code, values in (
-        ("atv312", "ACC", (30, 30)), ("atv312", "ACC", (30, 35)), ("atv312", "LSP", (0, 0)),
+        ("atv312", "ACC", (30, 30)), ("atv312", "ACC", (30, 35)), ("atv312", "ACC", (30, 32)),
+        ("atv312", "LSP", (0, 0)),
         ("atv312", "LSP", (0, 500)), ("atv312", "rFr", (500, 30)), ("atv312", "Ctr", (1, 1)),
         ("atv312", "CHP", (0, 1)), ("atv312", "ACC", (None, None)), ("atv312", "ACC", (None, 30)),
         ("atv71", "ACC", (30, None)), ("atv71", "ULN", (3, 5)), ("atv71", "STT", (1, 2)),

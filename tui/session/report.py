@@ -140,9 +140,7 @@ class ReportParts:
     def control(self) -> list[str]:
         """Return the commander of the drive and the source of its reference."""
         raws = self.values.raws
-        source = source_in_force(self.profile, raws)
-        name = source.name if source else "none of those in the manual"
-        lines = [f"- Configuration: {name}"]
+        lines = [f"- Configuration: {self._configuration()}"]
         reported = read_chart(self.profile, raws)
         lines += [f"- Commanded by: {reported.channel}"] if reported.channel else []
         lines += [f"- Reference from: {reported.reference}"] if reported.reference else []
@@ -157,6 +155,23 @@ class ReportParts:
                 text = ", ".join(bit.name for bit in bits) or "none"
             lines.append(f"- {parameter.name} ({parameter.code}): {text}")
         return ["## Control source", "", *lines]
+
+    def _configuration(self) -> str:
+        """Return the name of the configuration of control sources, or why there is none."""
+        sources, raws = self.profile.data.control_sources, self.values.raws
+        if (source := source_in_force(self.profile, raws)) is not None:
+            return source.name
+        if not sources:
+            return "the profile of this family lists none"
+        possible = [
+            source
+            for source in sources
+            if all(raws.get(word.parameter, word.value) == word.value for word in source.settings)
+        ]
+        words = (word.parameter for source in possible for word in source.settings)
+        if unread := list(dict.fromkeys(code for code in words if code not in raws)):
+            return f"not known (not read: {', '.join(unread)})"
+        return "none of those in the manual"
 
     def blocks(self) -> list[str]:
         """Return the contents of indirect blocks and the communication scanner."""
@@ -196,14 +211,17 @@ class ReportParts:
             lines.append(f"- Reaction: {watch.reactions[0].does}")
         lines.append(f"- The watch begins: {watch.starts}")
         if not self.proofs:
-            return [*lines, "- Not proved: `drivepanel prove`, or P on Control, does."]
+            return [*lines, "- Not tested. Run `drivepanel prove`, or press P on Control."]
         last = self.proofs[-1]
-        return [*lines, f"- Proved {last.time[:16].replace('T', ' ')}: {last.new}"]
+        return [*lines, f"- Tested {zoned_time(last.time, self.zone)}: {last.new}"]
 
     def faults(self) -> list[str]:
         """Return the present or last fault, and the drive's fault history."""
         data = self.profile.data.faults
         codes = list(dict.fromkeys(code for code in (data.parameter, *data.history) if code))
+        if not codes:
+            text = "No available document names a fault register of this family."
+            return ["## Faults", "", text]
         rows = [(code, self.profile[code].name, self.fault_text(code)) for code in codes]
         lines = ["## Faults", "", *table_markdown(("code", "name", "fault"), rows)]
         for code, stored in zip(data.history, data.stored, strict=False):

@@ -301,6 +301,12 @@ def _settings(parts: ReportParts) -> ReportSection:
     )
 
 
+SETTINGS_SINCE: Mapping[bool | None, str] = MappingProxyType(
+    {True: "unchanged", False: "CHANGED", None: "not known"}
+)
+"""Texts about settings that are those after a test, others, or not known."""
+
+
 def _tests(parts: ReportParts, results: Sequence[StoredResult]) -> ReportSection:
     rows = [
         (
@@ -308,7 +314,7 @@ def _tests(parts: ReportParts, results: Sequence[StoredResult]) -> ReportSection
             result.name,
             "PASSED" if result.passed else f"NOT PASSED. {result.why_not or ''}".rstrip(),
             result.steps_text,
-            "unchanged" if unchanged_since(result, parts.profile, parts.values) else "CHANGED",
+            SETTINGS_SINCE[unchanged_since(result, parts.profile, parts.values)],
             result.by,
         )
         for result in results
@@ -317,7 +323,8 @@ def _tests(parts: ReportParts, results: Sequence[StoredResult]) -> ReportSection
     if parts.proofs:
         proof = parts.proofs[-1]
         when = zoned_time(proof.time, parts.zone)[:10]
-        rows.append((when, "Communication loss", proof.new, "", "", ""))
+        # first: the last rows are not shown
+        rows.insert(0, (when, "Communication loss", proof.new, "", "", ""))
     note = "" if rows else "No result of `drivepanel accept` for this drive was found."
     return _limited(ReportSection("Tests", rows, head, note), TESTS_SHOWN)
 

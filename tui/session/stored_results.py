@@ -90,8 +90,10 @@ def _may_be_same(first: Mapping[str, str], other: Mapping[str, str]) -> bool:
     return all(first[key] == other[key] for key in first.keys() & other.keys())
 
 
-def unchanged_since(result: StoredResult, profile: Profile, values: ParameterSet) -> bool:
-    """Return True if the drive has the settings that it had after the test."""
+def unchanged_since(result: StoredResult, profile: Profile, values: ParameterSet) -> bool | None:
+    """Return True if the drive has the settings that it had after the test; None if unknown."""
+    if result.settings_hash_after is None:
+        return None
     codes = setting_codes(profile)
     raws = {code: values.raws[code] for code in codes if code in values.raws}
     now = settings_hash(ParameterSet(values.head, raws))

@@ -34,8 +34,9 @@ def curve_files(result: AcceptanceResult, stem: str) -> dict[int, tuple[str, str
 def result_markdown(result: AcceptanceResult, curves: Mapping[int, tuple[str, str]]) -> str:
     """Return the report as Markdown; it shows the curves by the names of their files."""
     verdict = "PASSED" if result.passed else f"NOT PASSED. {result.why_not}"
-    same = result.settings_after == result.settings_hash
-    after = "unchanged after the test" if same else "changed, or not read, after the test"
+    after = "changed during the test" if result.settings_trouble else "unchanged after the test"
+    if not result.settings_after:
+        after = "not read after the test"
     lines = [
         f"# {result.name}",
         "",
@@ -76,9 +77,8 @@ def _step_lines(step: StepResult, curves: Mapping[int, tuple[str, str]]) -> list
 def result_junit(result: AcceptanceResult) -> str:
     """Return the result as JUnit XML: a test case for each step, and one for the settings."""
     rows = [_case(result, s.title, s.seconds, _trouble(s), _output(s)) for s in result.steps]
-    settings = ""
-    if result.settings_hash != result.settings_after:
-        settings = _element("failure", result.why_not or "The settings changed.")
+    trouble = result.settings_trouble
+    settings = _element("failure", trouble) if trouble else ""
     rows.append(_case(result, "settings unchanged after the test", 0.0, settings, ""))
     failed = sum("<failure" in row for row in rows)
     skipped = sum("<skipped" in row for row in rows)

@@ -104,11 +104,18 @@ class AcceptanceResult:
         failed = [str(s.number) for s in self.steps if s.outcome == "failed"]
         if failed:
             return f"Failed: step {', '.join(failed)}."
+        if self.settings_trouble:
+            return self.settings_trouble
+        return "" if self.passed else "Steps were not run."
+
+    @property
+    def settings_trouble(self) -> str:
+        """Why the settings are not known to be unchanged, in a sentence; empty if they are."""
         if not self.settings_after:
-            return "The settings could not be read after the test."
+            return "The settings were not read after the test."
         if self.settings_after != self.settings_hash:
             return "Settings of the drive changed during the test."
-        return "" if self.passed else "Steps were not run."
+        return ""
 
 
 def settings_hash(values: ParameterSet) -> str:

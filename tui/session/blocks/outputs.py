@@ -86,7 +86,7 @@ def intended(
     inputs, _ = together(profile, inputs, outputs, "write")
     carried = [code for code in _codes(profile, outputs, places) if code not in wanted]
     if unread := [code for code in carried if code not in raws]:
-        lines.append(f"Frame: not shown, because {all_of(unread)} was not read yet.")
+        lines.append(f"Frame: not shown. Not read yet: {', '.join(unread)}.")
     else:
         words = [_word(profile, outputs, place, {**raws, **wanted}) for place in places]
         frame = hex_text(block_request(profile, device, inputs, outputs, words, places))
