@@ -19,7 +19,7 @@ from .replay_reader import (
     reduced_in,
     reply_in,
 )
-from .schema import COPY, GOOD, RECORDED_READS, REFUSED, SILENT
+from .schema import COPY, GOOD, RECORDED_READS, REFUSED, SILENT, WRONG
 
 PASSED_OVER = 120_000_000
 """Microseconds beyond which only the newest replies are read, not those in between."""
@@ -46,11 +46,16 @@ def ends_of_cycles(replies: Sequence[RecordedReply], until: float) -> list[float
 
 
 def count_recorded(tally: Tally, device: int, reply: RecordedReply) -> None:
-    """Count an exchange of the record, as the line counted it then."""
-    if reply.quality > COPY:
+    """Count an exchange of the record, as the line counted it then.
+
+    Reduced replies are not counted: neither their number nor their times are those of one exchange.
+    """
+    if reply.quality > COPY or reply.reduced:
         return
     seconds = (reply.ended - reply.sent) / 1e6
     tally.count_sent(device, 0)
+    if reply.repeat:
+        tally.count_repeat(device)
     tally.count_end(device, seconds, 0)
     if reply.quality in (GOOD, REFUSED, COPY):
         tally.count_reply(device, seconds)
@@ -60,7 +65,7 @@ def count_recorded(tally: Tally, device: int, reply: RecordedReply) -> None:
     elif reply.quality == SILENT:
         tally.count_silence(device, searched=False)
     else:
-        tally.count_checksum(device)
+        (tally.count_wrong if reply.quality == WRONG else tally.count_checksum)(device)
         tally.count_minute(device, "damaged")
 
 
@@ -95,6 +100,9 @@ class NewestReplies:
             newest = self._reader.newest(self._device, self._before_repeat(at))
             for reply in sorted(newest, key=lambda reply: (reply.ended, reply.reduced)):
                 self._take(reply)
+            if self.failures:  # the newest ones have one for each place only
+                failed = self._reader.failures(self._device, self.heard or 0, at)
+                self.failures = max(self.failures, failed)
             # exchanges that had begun by then may end later
             begin = at - 2 * REPEATED_WITHIN
             self._tables = {name: _Following(begin, at) for name in ("reply", "reduced")}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from .schema import QUALITIES, STRAY, ReplyRow, read_reply
+from .schema import DAMAGED, QUALITIES, STRAY, WRONG, ReplyRow, read_reply
 
 CHECKED_REPLIES = ("good", "exception", "possible copy of the previous reply")
 """Qualities of replies of which the record has function and data."""
@@ -13,6 +13,7 @@ MULTIPLE, SINGLE = 16, 6
 """Functions that write registers, whose requests have the words."""
 WRITE_REPLY = 5
 """Bytes of a request to write that its reply repeats."""
+_NOTES = {DAMAGED: "damaged", WRONG: "not the reply"}
 
 
 class RebuiltFrame(NamedTuple):
@@ -25,6 +26,8 @@ class RebuiltFrame(NamedTuple):
     """End of the frame in seconds since 1970."""
     request: bool
     checked: bool = True
+    note: str = ""
+    """Remark of the line on what was received, as it is in a trace."""
 
 
 def frames_of(row: ReplyRow) -> Iterator[RebuiltFrame]:
@@ -36,7 +39,8 @@ def frames_of(row: ReplyRow) -> Iterator[RebuiltFrame]:
         yield RebuiltFrame(row.device, request, sent, request=True)
     if QUALITIES[row.quality] not in CHECKED_REPLIES:
         if row.received:
-            yield RebuiltFrame(row.device, row.received, came, request=False, checked=False)
+            note = _NOTES.get(row.quality, "")
+            yield RebuiltFrame(row.device, row.received, came, False, False, note)
         return
     reply = row.received if row.received is not None else _reply(row, request)
     yield RebuiltFrame(row.device, reply, came, request=False)

@@ -72,8 +72,7 @@ def wire_frame(rebuilt: RebuiltFrame, link: Link) -> Frame:
         data = bytes(4) + (len(data) + 1).to_bytes(2, "big") + bytes([rebuilt.device]) + data
     elif rebuilt.checked:
         data = frame(rebuilt.device, data)
-    note = "" if rebuilt.checked else "damaged"
-    return Frame(rebuilt.wall, "out" if rebuilt.request else "in", data[:MOST_BYTES], note)
+    return Frame(rebuilt.wall, "out" if rebuilt.request else "in", data[:MOST_BYTES], rebuilt.note)
 
 
 T = TypeVar("T")

@@ -18,6 +18,7 @@ from tui.bus.requests import REFERENCE, Objects, own_words_of
 from .reader import RecordReader
 from .reduction import extent_of
 from .schema import (
+    COPY,
     DAMAGED,
     GOOD,
     QUALITIES,
@@ -31,6 +32,11 @@ from .schema import (
 
 ROWS_AHEAD = 500
 """Rows that are read in one query while a replay goes on."""
+_FAILED = {
+    "reply": f"repeat = 0 AND quality BETWEEN {SILENT} AND {COPY}",
+    "reduced": "good = 0",
+}
+"""Conditions of rows without a good reply, by table."""
 LONGEST_EXCHANGE = 60_000_000
 """Microseconds in which any exchange ends."""
 MOST_KNOWN = 20
@@ -175,6 +181,15 @@ class ReplayReader(RecordReader):
         known.append((until, found))
         del known[:-MOST_KNOWN]
         return found
+
+    def failures(self, device: int, since: int, until: int) -> int:
+        """Return how many requests to a device failed in a time, without their repeats."""
+        where, most = "device = ? AND utc >= ? AND utc + took <= ?", 0
+        for table, failed in _FAILED.items():
+            query = f"SELECT count(*) FROM {table} WHERE {where} AND {failed}"
+            (count,) = self._base.execute(query, (device, since, until)).fetchone()
+            most = max(most, count)
+        return most
 
     def following(self, table: str, device: int, last: tuple[int, int]) -> list[Any]:
         """Return the next rows of a device after a time and a row."""
