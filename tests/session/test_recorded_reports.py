@@ -74,7 +74,8 @@ def pages() -> Iterator[str]:
     """Pages of drives in several states, in each form."""
     profile = whole()
     tests = [
-        stored(7), stored(6, passed=False, why_not="Failed: step 2."), stored(5, passed=False, settings_hash_after=None),
+        stored(7), stored(6, passed=False, why_not="Failed: step 2."),
+        stored(5, passed=False, settings_hash_after=None),
         stored(4, settings_hash_after="x"), stored(3, identity={"reference": "EXFAN-11"}),
         stored(2, device=8), stored(1, line="rtu:y"), stored(1, profile="other"),
         stored(9, name="Test 7"), stored(8), stored(10, identity={}), stored(11), stored(12),
