@@ -9,7 +9,7 @@ from typing import Literal
 from tui.drive.sentences import all_of, counted
 
 from .plan_file import LinePlan, PlanMaster, PlanStation
-from .timing import LineTimes, StationTimeout
+from .timing import LOST_CYCLES, RETRIES, LineTimes, StationTimeout
 
 Severity = Literal["error", "warning", "note"]
 OWN_RULE = "Drive Panel's own rule"
@@ -30,6 +30,8 @@ class PlanFinding:
     """Document and chapter with the limit."""
     addresses: tuple[int, ...] = ()
     """Stations that it concerns."""
+    of_master: bool = False
+    """True if it concerns the master."""
 
 
 def element_text(item: PlanMaster | PlanStation) -> str:
@@ -86,10 +88,16 @@ class _Checks:
         self.chapter = f"{self.profile.name}: {self.limits.source}"
 
     def _finding(
-        self, severity: Severity, subject: str, text: str, *stations: PlanStation, chapter: str = ""
+        self,
+        severity: Severity,
+        subject: str,
+        text: str,
+        *items: PlanMaster | PlanStation,
+        chapter: str = "",
     ) -> PlanFinding:
-        addresses = tuple(station.address for station in stations)
-        return PlanFinding(severity, subject, text, chapter or self.chapter, addresses)
+        addresses = tuple(item.address for item in items if isinstance(item, PlanStation))
+        of_master = any(isinstance(item, PlanMaster) for item in items)
+        return PlanFinding(severity, subject, text, chapter or self.chapter, addresses, of_master)
 
     def stations(self) -> Iterator[PlanFinding]:
         """Count the slaves."""
@@ -141,7 +149,7 @@ class _Checks:
             yield self._finding("warning", "Polarization", text, *unknown, chapter=OWN_RULE)
         if plan.file.master.polarization is None:
             text = "The plan does not state the polarization at the master. It counts as none."
-            yield self._finding("warning", "Polarization", text)
+            yield self._finding("warning", "Polarization", text, plan.file.master)
         yield from self._impossible_ports()
         re = total_ohm(plan)
         if re is None:
@@ -181,15 +189,14 @@ class _Checks:
             f"No device has a polarization. Install {span} ohm to each of 5 V and common at the"
             " master."
         )
-        yield self._finding("error", "Polarization", text)
+        yield self._finding("error", "Polarization", text, plan.file.master)
 
     def _in_every_station(self, wanted: int) -> Iterator[PlanFinding]:
         others = [item for item in self.plan.elements if self.plan.ohm(item) != wanted]
         if others:
             names = all_of([element_text(item) for item in others])
             text = f"{wanted} ohm belong in every station and the master. Without it: {names}."
-            stations = [item for item in others if isinstance(item, PlanStation)]
-            yield self._finding("error", "Polarization", text, *stations)
+            yield self._finding("error", "Polarization", text, *others)
 
     def _mixed(self, re: float) -> Iterator[PlanFinding]:
         plan, limits = self.plan, self.limits
@@ -206,7 +213,8 @@ class _Checks:
         )
         if not low <= re <= high:
             text = f"All polarization resistors give Re = {re:.0f} ohm, not {low} to {high}."
-            yield self._finding("error", "Polarization", f"{text} {advice}", *polarized)
+            text, master = f"{text} {advice}", plan.file.master
+            yield self._finding("error", "Polarization", text, master, *polarized)
         elif rp and re < FAR_FROM_BEST * (limits.best_ohm or 0):
             text = f"All polarization resistors give Re = {re:.0f} ohm, which is allowed."
             yield self._finding("note", "Polarization", f"{text} {advice}")
@@ -228,7 +236,7 @@ class _Checks:
             yield self._finding("error", "Polarization", text, *others)
         if ohm is not None and not low <= ohm <= high:
             text = f"The master has {ohm} ohm. It needs {span} ohm."
-            yield self._finding("error", "Polarization", text)
+            yield self._finding("error", "Polarization", text, self.plan.file.master)
 
     def terminators(self) -> Iterator[PlanFinding]:
         """Check the terminators: one of the right kind at each end, and none between."""
@@ -241,17 +249,17 @@ class _Checks:
             if number not in (0, len(places) - 1):
                 if fitted:
                     text = f"A terminator at {name} is not at an end of the line. Remove it."
-                    yield self._finding("error", "Termination", text, *_stations(fitted))
+                    yield self._finding("error", "Termination", text, *fitted)
                 continue
             if not fitted:
                 text = f"The end at {name} has no terminator. Fit {wanted}."
-                yield self._finding("error", "Termination", text, *_stations(place))
+                yield self._finding("error", "Termination", text, *place)
             elif len(fitted) > 1:
                 text = f"The end at {name} has {len(fitted)} terminators. Keep one."
-                yield self._finding("error", "Termination", text, *_stations(fitted))
+                yield self._finding("error", "Termination", text, *fitted)
             elif fitted[0].terminator not in right:
                 text = f"The terminator at {name} is {fitted[0].terminator}. Fit {wanted}."
-                yield self._finding("error", "Termination", text, *_stations(fitted))
+                yield self._finding("error", "Termination", text, *fitted)
 
     def addresses(self) -> Iterator[PlanFinding]:
         """Find addresses that do not select one drive."""
@@ -293,7 +301,7 @@ class _Checks:
                 "The plan does not state {count} lengths of `cable`: the line is longer than"
                 " calculated.",
             )
-            yield self._finding("note", "Length", text, *_stations(bare), chapter=OWN_RULE)
+            yield self._finding("note", "Length", text, *bare, chapter=OWN_RULE)
         stubs = [s for s in plan.file.stations if s.stub is None]
         if stubs:
             text = f"The plan does not state the tap link (`stub`) of {_names(stubs)}."
@@ -314,34 +322,45 @@ class _Checks:
 def _cycle(plan: LinePlan, times: LineTimes) -> Iterator[PlanFinding]:
     period = plan.file.period
     if period is not None and times.cycle > period:
-        text = f"One cycle takes {times.cycle:.3f} s, but the plan wants {period:g} s."
+        text = f"One cycle takes {times.cycle:.3f} s, but the plan requires {period:g} s."
         yield PlanFinding("error", "Cycle time", text, _CALCULATED)
     wait = plan.file.master.timeout
     if wait is not None and wait < times.reply:
         text = f"The master waits {wait:g} s for a reply. Suitable is {times.reply:g} s or more."
-        yield PlanFinding("warning", "Timeouts", text, OWN_RULE)
+        yield PlanFinding("warning", "Timeouts", text, OWN_RULE, of_master=True)
     for item in times.timeouts:
-        yield from _timeout(plan, item, times.longest)
+        yield from _timeout(plan, item, times)
 
 
-def _timeout(plan: LinePlan, item: StationTimeout, longest: float) -> Iterator[PlanFinding]:
+def _timeout(plan: LinePlan, item: StationTimeout, times: LineTimes) -> Iterator[PlanFinding]:
     station, profile = item.station, plan.profile(item.station)
     rules = profile.data.communication_fault if profile else None
     name, concerned = element_text(station), (station.address,)
     chapter = f"{profile.name}: {rules.source or rules.timeout}" if profile and rules else ""
-    wanted = station.timeout
+    wanted, longest = station.timeout, times.longest
     if item.suitable is None:
+        wait = plan.file.master.timeout or 0
+        advice = "Shorten the cycle."
+        saved = (RETRIES + 1) * (wait - times.reply)
+        if saved > 0 and LOST_CYCLES * (longest - saved) <= item.high:
+            advice = f"Shorten the timeout of the master, {wait:g} s."
         text = (
             f"{item.parameter} of {name} is {item.high:g} s at most, but the line needs"
-            f" {item.shortest:g} s. Shorten the cycle."
+            f" {item.shortest:g} s. {advice}"
         )
         yield PlanFinding("error", "Timeouts", text, chapter, concerned)
     elif wanted is not None and wanted > item.high:
         text = f"{item.parameter} of {name} is {item.high:g} s at most, not {wanted:g} s."
         yield PlanFinding("error", "Timeouts", text, chapter, concerned)
+    elif wanted is not None and wanted < item.low:
+        text = (
+            f"{item.parameter} of {name} is {item.low:g} s at least, not {wanted:g} s. Set"
+            f" {item.suitable:g} s or more."
+        )
+        yield PlanFinding("error", "Timeouts", text, chapter, concerned)
     elif wanted is not None and wanted < longest:
         text = (
-            f"{name} trips after {wanted:g} s ({item.parameter}), but may be polled only each"
+            f"{name} trips after {wanted:g} s ({item.parameter}), but may be polled only every"
             f" {longest:.2f} s if another device does not answer. Set {item.suitable:g} s or more."
         )
         yield PlanFinding("error", "Timeouts", text, chapter, concerned)
@@ -351,10 +370,6 @@ def _timeout(plan: LinePlan, item: StationTimeout, longest: float) -> Iterator[P
             f" {item.suitable:g} s or more."
         )
         yield PlanFinding("warning", "Timeouts", text, chapter, concerned)
-
-
-def _stations(items: list[PlanMaster | PlanStation]) -> list[PlanStation]:
-    return [item for item in items if isinstance(item, PlanStation)]
 
 
 def _names(stations: list[PlanStation]) -> str:

@@ -38,7 +38,9 @@ class DrawnElement:
 
 def drawn_elements(plan: LinePlan, findings: list[PlanFinding]) -> list[DrawnElement]:
     """Return the elements in the order of the cable; wrong are those with an error."""
-    wrong = {a for f in findings if f.severity == "error" for a in f.addresses}
+    errors = [finding for finding in findings if finding.severity == "error"]
+    wrong = {address for finding in errors for address in finding.addresses}
+    master_wrong = any(finding.of_master for finding in errors)
     rows: list[DrawnElement] = []
     for number, place in enumerate(plan.places):
         for index, item in enumerate(place):
@@ -51,7 +53,7 @@ def drawn_elements(plan: LinePlan, findings: list[PlanFinding]) -> list[DrawnEle
                     plain(_notes(plan, item)),
                     isinstance(item, PlanMaster),
                     not index,
-                    isinstance(item, PlanStation) and item.address in wrong,
+                    item.address in wrong if isinstance(item, PlanStation) else master_wrong,
                 )
             )
     return rows
@@ -86,7 +88,7 @@ def _notes(plan: LinePlan, item: PlanMaster | PlanStation) -> str:
 
 
 def diagram_text(plan: LinePlan, findings: list[PlanFinding]) -> list[str]:
-    """Return the diagram as lines of text; `!` marks a station with an error."""
+    """Return the diagram as lines of text; `!` marks an element with an error."""
     lines: list[str] = []
     for row in drawn_elements(plan, findings):
         if row.cable:

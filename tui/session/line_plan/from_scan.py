@@ -58,6 +58,7 @@ def _rows(path: Path) -> Iterator[tuple[int, dict[str, Any]]]:
 
 def _text(name: str, hits: list[dict[str, Any]]) -> str:
     first = hits[0]
+    form = first.get("format")
     rows = [
         "# Plan of a line, begun from a scan. The stations are in the order of their addresses.",
         "# Put them in the order of the cable, and add the lengths in the lines with a #.",
@@ -65,7 +66,7 @@ def _text(name: str, hits: list[dict[str, Any]]) -> str:
         "format = 1",
         f"name = {escaped_toml(name)}",
         f"baud = {first['baud']}" if isinstance(first.get("baud"), int) else "# baud = 19200",
-        f"characters = {escaped_toml(str(first.get('format') or '8E1'))}",
+        f"characters = {escaped_toml(str(form))}" if form else '# characters = "8E1"',
         "",
         "[master]",
         "# polarization = 650  # ohm to each of 5 V and common",

@@ -62,12 +62,26 @@ class _Chosen:
         self._trunk(chains)
         self._terminators()
         self._master()
+        self._unknown_lengths()
         order = list(self.known)
         rows = [
             PartRow(self.known[n].number, self.counts[n], self.known[n].text, self.known[n].source)
             for n in sorted(self.counts, key=order.index)
         ]
         return PartsList(rows, self.remarks)
+
+    def _unknown_lengths(self) -> None:
+        """Name the lengths that the plan does not state."""
+        for place in self.plan.places[1:]:
+            if place[0].cable is None:
+                name = element_text(place[0])
+                text = f"The plan does not state the cable before {name}."
+                self.remarks.append(f"{text} It is not in this list.")
+        for station in self.plan.file.stations:
+            if station.stub is None:
+                name = element_text(station)
+                text = f"The plan does not state the tap link of {name}."
+                self.remarks.append(f"{text} It counts as {_USUAL_STUB:g} m.")
 
     def _find(self, use: str, ends: Sequence[str]) -> Iterator[tuple[str, CablingPart]]:
         """Yield the parts of a use with these ends, shortest first."""

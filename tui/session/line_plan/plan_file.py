@@ -250,7 +250,8 @@ def _faults(plan: LinePlan) -> Iterator[tuple[TomlPath, str]]:
         yield ("master", "position"), text
     known = plan.masters()
     if plant.master.kind and plant.master.kind not in known:
-        text = f"{plant.master.kind!r} is not a kind of master. Allowed: {any_of(list(known))}"
+        allowed = any_of([repr(name) for name in known])
+        text = f"{plant.master.kind!r} is not a kind of master. Allowed: {allowed}"
         yield ("master", "kind"), text
     first = plan.elements[0]
     addresses: dict[int, int] = {}
@@ -281,7 +282,7 @@ def _faults(plan: LinePlan) -> Iterator[tuple[TomlPath, str]]:
 def _station_faults(plan: LinePlan, station: PlanStation) -> Iterator[tuple[str, str]]:
     profile = plan.profile(station)
     if profile is None:
-        if station.values:
+        if station.values and not station.profile:
             yield "values", "codes need a `profile`. Use `words` for another device"
         return
     if station.words is not None:
