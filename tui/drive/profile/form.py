@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec.inspect as shapes
 
-from tui.drive.sentences import any_of
+from tui.drive.sentences import any_of, counted
 
 from .schema import ProfileData
 from .toml_lines import TomlPath
@@ -102,12 +102,16 @@ def _list(shape: shapes.ListType, value: list[Any], path: TomlPath, faults: Form
             item = _invented(shape.item_type)
         kept.append(item)
     if shape.min_length and len(value) < shape.min_length:
-        faults.found.append((path, f"must have at least {shape.min_length} entries"))
+        faults.found.append((path, f"must have at least {_entries(shape.min_length)}"))
         return _ABSENT
     if shape.max_length and len(value) > shape.max_length:
-        faults.found.append((path, f"must have at most {shape.max_length} entries"))
+        faults.found.append((path, f"must have at most {_entries(shape.max_length)}"))
         return _ABSENT
     return kept
+
+
+def _entries(count: int) -> str:
+    return counted(count, "1 entry", "{count} entries")
 
 
 def _scalar_fault(shape: shapes.Type, value: Any) -> str:

@@ -59,7 +59,8 @@ def _key(at: TomlPath, rows: Mapping[str, str]) -> str:
     row = ""
     for part in at:
         if isinstance(part, int):
-            parts.append(f"{row} {part + 1}".strip())
+            name, row = row or "entry", ""
+            parts.append(f"{name} {part + 1}")
         elif part in rows:
             row = rows[part]
         else:

@@ -45,7 +45,9 @@ async def run_direction(work: StepWork, step: DirectionStep, result: StepResult)
             text = ", ".join(sorted(values))
             result.check(name, text, step.direction, passed=values == {step.direction})
     if not seen and not signs and not step.turns:
-        raise StepFailed("The drive reports no direction. Add `turns`, so that a person states it.")
+        raise StepFailed(
+            "The drive reports no direction. Add `turns` to this step, to ask the person."
+        )
     if step.turns:
         question = f"Which way did the motor turn ({step.direction}), toward the end of its shaft?"
         turned = await work.bench.unless_ended(work.ask_turned(question))

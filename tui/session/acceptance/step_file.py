@@ -18,6 +18,7 @@ from tui.drive.profile.toml_lines import TomlPath
 from tui.drive.sentences import any_of
 from tui.drive.settings.parameter_set import ParameterSet, SetError
 from tui.drive.settings.set_file import read_set
+from tui.drive.units import factor_between
 
 from .steps import (
     MOST_STEPS,
@@ -101,7 +102,7 @@ class _Checked:
         try:
             profile = library.load(test.profile)
         except DriveError as error:
-            self.faults.append((("profile",), str(error)))
+            self.faults.append((("profile",), str(error).rstrip(".")))
             self._raise()
             raise
         sets: dict[int, ParameterSet] = {}
@@ -165,16 +166,27 @@ def step_faults(step: AcceptanceStep, profile: Profile) -> Iterator[tuple[str, s
     if isinstance(step, DirectionStep) and not step.turns and not _reports_direction(profile):
         yield "kind", f"{profile.name} reports no direction: the field `turns` is missing"
     if isinstance(step, SpeedsStep):
-        for name in step.limits:
-            known = [q for q in MEASURED if profile.quantity(q) is not None]
-            if name not in known:
-                yield "limits", f"{name!r} is not a value of {profile.name}. It has {any_of(known)}"
+        yield from (("limits", fault) for fault in _limit_faults(step, profile))
     if isinstance(step, RampStep) and step.up is None and step.down is None:
         yield "kind", "a ramp needs `up`, `down` or both"
     if isinstance(step, StopStep) and step.min > step.max:
         yield "min", f"{step.min:g} is more than max = {step.max:g}"
     if isinstance(step, CommunicationLossStep):
         yield from _loss_faults(step, profile)
+
+
+def _limit_faults(step: SpeedsStep, profile: Profile) -> Iterator[str]:
+    known = {q: parameter for q in MEASURED if (parameter := profile.quantity(q)) is not None}
+    for name, limits in step.limits.items():
+        parameter = next((known[q] for q in known if q == name), None)
+        if parameter is None:
+            yield f"{name!r} is not a value of {profile.name}. It has {any_of(list(known))}"
+            continue
+        unit = parameter.unit
+        # a share may be shown in the unit of its rating, and some units follow from a setting
+        is_open = not unit or unit == "%" or parameter.unit_by or parameter.code in profile.taught
+        if not is_open and factor_between(limits.unit, unit) != 1:
+            yield f"{name} is in {unit} here, not in {limits.unit!r}"
 
 
 def _reports_direction(profile: Profile) -> bool:
