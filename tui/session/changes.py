@@ -38,7 +38,7 @@ TRIP_NOTED_WITHIN = 5.0
 """Seconds between the reading of a fault and its entry in the journal, at most."""
 _END_OF_TIME = 4e9
 """A time after all records, in seconds since 1970."""
-_EXACT = 1.0
+EXACT_WITHIN = 1.0
 """Seconds up to which the times of a run or a trip count as exact."""
 
 
@@ -269,7 +269,7 @@ def entry_text(entry: Entry) -> str:
     """Return an entry without its time and drive: old and new value, answer, reason."""
     match entry.kind:
         case "fault":
-            note = f"  (time to {entry.within:.0f} s)" if entry.within > _EXACT else ""
+            note = f" (time to {entry.within:.0f} s)" if entry.within > EXACT_WITHIN else ""
             return f"{f'FAULT {entry.code} {entry.new}'.rstrip()}: {entry.answer}{note}"
         case "proof":
             return f"{entry.why}: {entry.new}  {entry.answer}"
@@ -298,8 +298,8 @@ def run_text(run: RecordedRun) -> str:
         parts.append("by another source")
     notes = [] if run.begin_within is not None else ["it ran when first read"]
     within = max(run.begin_within or 0, run.end_within or 0)
-    notes += [f"times to {within:.0f} s"] if within > _EXACT else []
-    return " ".join(parts) + (f"  ({', '.join(notes)})" if notes else "")
+    notes += [f"times to {within:.0f} s"] if within > EXACT_WITHIN else []
+    return " ".join(parts) + (f" ({', '.join(notes)})" if notes else "")
 
 
 def loss_text(loss: LostLink) -> str:

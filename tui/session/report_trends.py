@@ -13,7 +13,7 @@ from tui.drive.profile.schema import Quantity
 from tui.drive.values import is_signed_type
 
 from .acceptance.curve import RunCurve, RunPoint, curve_svg
-from .changes import local_time, run_text
+from .changes import EXACT_WITHIN, local_time, run_text
 from .journal import Entry
 from .monitor.trend import readout_parameter
 from .record.columns import reach_of_points
@@ -52,7 +52,11 @@ def report_trends(
     `entries` are those of the drive in the journal; `now` is in seconds since 1970. It reads files.
     """
     shown = history_of(read_events(files), device, profile.id, now - RUN_SOUGHT_FOR, now)
-    seen = ((trip.begun, trip.code, trip.name) for trip in shown.trips if trip.within is not None)
+    seen = (
+        (trip.begun, trip.code, trip.name, trip.within)
+        for trip in shown.trips
+        if trip.within is not None
+    )
     trip = max((*_journal_trips(entries), *seen), default=None)
     found = [
         _trip(files, device, profile, *trip) if trip else None,
@@ -61,24 +65,31 @@ def report_trends(
     return [trend for trend in found if trend is not None]
 
 
-def _journal_trips(entries: Iterable[Entry]) -> Iterator[tuple[float, str, str]]:
-    """Yield time, code and name of the last trip in the journal, if its time is valid."""
+def _journal_trips(entries: Iterable[Entry]) -> Iterator[tuple[float, str, str, float]]:
+    """Yield time, code, name and 0 of the last trip in the journal, if its time is valid."""
     for trip in trips_of(entry for entry in entries if entry.kind == "fault")[-1:]:
         with suppress(ValueError, OverflowError):
-            yield datetime.fromisoformat(trip.tripped).timestamp(), trip.code, trip.name
+            yield datetime.fromisoformat(trip.tripped).timestamp(), trip.code, trip.name, 0.0
 
 
 def _trip(
-    files: Sequence[Path], device: int, profile: Profile, at: float, code: str, called: str
+    files: Sequence[Path],
+    device: int,
+    profile: Profile,
+    at: float,
+    code: str,
+    called: str,
+    within: float,
 ) -> ReportTrend | None:
-    """Return the seconds around a trip."""
+    """Return the seconds around a trip, whose time may be wrong by `within` seconds."""
     name = f"{code} {called}".strip()
     times = at - SECONDS_BEFORE_TRIP, at + SECONDS_AFTER_TRIP
     trend = _trend(files, device, profile, times)
     if trend is None:
         return None
     trend.curve.marks.append((at, code or "trip"))
-    return trend._replace(kind="trip", title=f"Trip {name}, {_when(at)}")
+    note = f" (time to {within:.0f} s)" if within > EXACT_WITHIN else ""
+    return trend._replace(kind="trip", title=f"Trip {name}, {_when(at)}{note}")
 
 
 def _run(

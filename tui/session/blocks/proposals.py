@@ -75,7 +75,7 @@ class Proposals:
         MappingError."""
         today = self.today(plan.block)
         if today is None:
-            raise MappingError(f"{plan.block.name} was not read yet. Wait until it is.")
+            raise MappingError(f"Not read yet: {plan.block.name}. Wait until it is.")
         if self.busy():
             raise MappingError("Not proposed: a write is in progress. Wait until it ends.")
         if plan.raws == today.raws:
@@ -130,7 +130,7 @@ class Proposals:
     def _base(self, block: Block) -> Assignment:
         plan = self.proposed(block)
         if plan is None:
-            raise MappingError(f"{block.name} was not read yet. Wait until it is.")
+            raise MappingError(f"Not read yet: {block.name}. Wait until it is.")
         return plan
 
     def changes(self, block: Block) -> list[SlotChange]:

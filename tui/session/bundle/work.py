@@ -57,14 +57,15 @@ def archive(results: Sequence[PartResult], redaction: Redaction, stem: str) -> B
         name if name in fixed else redaction.clean(name): _bytes(redaction.clean(content))
         for name, content in _files(results)
     }
-    omitted = {OMITTED_KINDS[by]: count for by, count in sorted(redaction.counts.items())}
     missing = {
         result.part.name: redaction.clean(result.missing)
         for result in results
         if result.file is None
     }
     sizes = {name: len(data) for name, data in files.items()}
-    head = _head(results, redaction, sizes)
+    head = list(_head(results, missing, redaction, sizes))
+    # only now: notes and reasons are cleaned, too
+    omitted = {OMITTED_KINDS[by]: count for by, count in sorted(redaction.counts.items())}
     readme = "\n".join([*head, *_omitted_lines(omitted), ""])
     files = {README_NAME: readme.encode(), **files}
     return Bundle(_zipped(files, stem), tuple(files), missing, omitted)
@@ -94,7 +95,10 @@ def _bytes(content: Content) -> bytes:
 
 
 def _head(
-    results: Sequence[PartResult], redaction: Redaction, sizes: dict[str, int]
+    results: Sequence[PartResult],
+    missing: dict[str, str],
+    redaction: Redaction,
+    sizes: dict[str, int],
 ) -> Iterator[str]:
     now = datetime.now().astimezone()
     yield f"Bundle of Drive Panel {tui.__version__}, {now:%Y-%m-%d %H:%M:%S %z}"
@@ -108,22 +112,25 @@ def _head(
         if result.file is None:
             continue
         described.add(result.part.name)
-        yield f"{result.part.name} ({sizes[result.part.name]} bytes)"
+        yield f"{result.part.name} ({_bytes_text(sizes[result.part.name])})"
         yield from _indented(result.part.about)
         yield from _indented(redaction.clean(result.file.note))
     for name in sizes:
         if name not in described:
-            yield f"{name} ({sizes[name]} bytes)"
+            yield f"{name} ({_bytes_text(sizes[name])})"
     yield ""
     yield "Could not get"
     yield "-------------"
-    lacking = [result for result in results if result.file is None]
-    for result in lacking:
-        yield f"{result.part.name}, because:"
-        yield from _indented(redaction.clean(result.missing))
-    if not lacking:
+    for name, why in missing.items():
+        yield f"{name}, because:"
+        yield from _indented(why)
+    if not missing:
         yield "Nothing: all files are here."
     yield ""
+
+
+def _bytes_text(size: int) -> str:
+    return counted(size, "1 byte", "{count} bytes")
 
 
 def _indented(text: str) -> Iterator[str]:

@@ -116,7 +116,7 @@ def read_history(
     last: tuple[Parameter, str] | None = None
     for profile in profiles.values():
         if (entry := profile.get(code)) is None:
-            work.note(f"The profile {profile.id} has no {code}.")
+            work.note(f"The profile {profile.id} has no parameter {code!r}.")
             continue
         sources = {
             source: _source(work, profile, source, since, until) for source in depends_on(entry)
