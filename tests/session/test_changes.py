@@ -421,7 +421,7 @@ def test_reset_while_the_drive_was_lost_has_the_seconds_that_are_not_known(folde
     write(folder, lost)
     assert [entry_text(item) for item in found(folder).entries] == [
         "FAULT OCF Overcurrent: tripped",
-        "FAULT OCF Overcurrent: reset  (time to 15 s)",
+        "FAULT OCF Overcurrent: reset (time to 15 s)",
     ]
     (trip,) = found(folder).trips
     assert trip.trip.tripped

@@ -269,8 +269,9 @@ def entry_text(entry: Entry) -> str:
     """Return an entry without its time and drive: old and new value, answer, reason."""
     match entry.kind:
         case "fault":
-            note = f" (time to {entry.within:.0f} s)" if entry.within > EXACT_WITHIN else ""
-            return f"{f'FAULT {entry.code} {entry.new}'.rstrip()}: {entry.answer}{note}"
+            text = f"{f'FAULT {entry.code} {entry.new}'.rstrip()}: {entry.answer}"
+            is_exact = entry.within <= EXACT_WITHIN
+            return text if is_exact else f"{text} (time to {entry.within:.0f} s)"
         case "proof":
             return f"{entry.why}: {entry.new}  {entry.answer}"
         case "reset":

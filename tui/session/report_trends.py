@@ -88,8 +88,10 @@ def _trip(
     if trend is None:
         return None
     trend.curve.marks.append((at, code or "trip"))
-    note = f" (time to {within:.0f} s)" if within > EXACT_WITHIN else ""
-    return trend._replace(kind="trip", title=f"Trip {name}, {_when(at)}{note}")
+    title = f"Trip {name}, {_when(at)}"
+    if within > EXACT_WITHIN:
+        title = f"{title} (time to {within:.0f} s)"
+    return trend._replace(kind="trip", title=title)
 
 
 def _run(
