@@ -342,7 +342,7 @@ FAULTS = {
     ),
     "master": (
         line(station(1)).replace("[master]", '[master]\nkind = "PLC"'),
-        "4: master, kind: 'PLC' is not a kind of master. Allowed: Twido",
+        "4: master, kind: 'PLC' is not a kind of master. Allowed: 'Twido",
     ),
     "position": (
         line(station(1)).replace("[master]", "[master]\nposition = 2"),
