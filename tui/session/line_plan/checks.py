@@ -30,7 +30,7 @@ class PlanFinding:
     """Document and chapter with the limit."""
     addresses: tuple[int, ...] = ()
     """Stations that it concerns."""
-    of_master: bool = False
+    concerns_master: bool = False
     """True if it concerns the master."""
 
 
@@ -96,8 +96,10 @@ class _Checks:
         chapter: str = "",
     ) -> PlanFinding:
         addresses = tuple(item.address for item in items if isinstance(item, PlanStation))
-        of_master = any(isinstance(item, PlanMaster) for item in items)
-        return PlanFinding(severity, subject, text, chapter or self.chapter, addresses, of_master)
+        concerns_master = any(isinstance(item, PlanMaster) for item in items)
+        return PlanFinding(
+            severity, subject, text, chapter or self.chapter, addresses, concerns_master
+        )
 
     def stations(self) -> Iterator[PlanFinding]:
         """Count the slaves."""
@@ -327,7 +329,7 @@ def _cycle(plan: LinePlan, times: LineTimes) -> Iterator[PlanFinding]:
     wait = plan.file.master.timeout
     if wait is not None and wait < times.reply:
         text = f"The master waits {wait:g} s for a reply. Suitable is {times.reply:g} s or more."
-        yield PlanFinding("warning", "Timeouts", text, OWN_RULE, of_master=True)
+        yield PlanFinding("warning", "Timeouts", text, OWN_RULE, concerns_master=True)
     for item in times.timeouts:
         yield from _timeout(plan, item, times)
 

@@ -40,7 +40,7 @@ def drawn_elements(plan: LinePlan, findings: list[PlanFinding]) -> list[DrawnEle
     """Return the elements in the order of the cable; wrong are those with an error."""
     errors = [finding for finding in findings if finding.severity == "error"]
     wrong = {address for finding in errors for address in finding.addresses}
-    master_wrong = any(finding.of_master for finding in errors)
+    master_wrong = any(finding.concerns_master for finding in errors)
     rows: list[DrawnElement] = []
     for number, place in enumerate(plan.places):
         for index, item in enumerate(place):
