@@ -7,6 +7,9 @@ from collections.abc import Iterator
 
 import pytest
 
+from tui.drive.control_source import control_taking
+from tui.drive.profile import library
+
 from .commands import held, invoked, motor, put, refused, run, tcp_line
 
 DRIVE = ("-p", "powerdrive")
@@ -74,6 +77,22 @@ def test_taking_control_of_a_family_without_it_exits_with_5() -> None:
 def test_giving_back_control_of_a_family_without_it_stops_and_exits_with_6() -> None:
     output = refused(6, "stop", "sim:atv71@1", "--give-back", "--arm")
     assert "has no control to give back" in output
+
+
+def test_advice_to_arm_is_only_for_a_family_that_can_give_back() -> None:
+    output = refused(6, "stop", "sim:atv71@1", "--give-back")
+    assert "has no control to give back" in output
+    assert "--arm" not in output.replace("reset --arm", "")
+
+
+def test_control_that_is_given_back_is_not_offered_again() -> None:
+    profile = library.load("atv21")
+    held = control_taking(profile, {"FA00": 0x0000})
+    commanded = control_taking(profile, {"FA00": 0xC000})
+    assert held is not None
+    assert (held.taken, held.is_given_back) == (False, True)
+    assert commanded is not None
+    assert (commanded.taken, commanded.is_given_back) == (None, False)
 
 
 def test_status_omits_control_for_a_family_without_it() -> None:

@@ -5,6 +5,11 @@ from __future__ import annotations
 import json
 from typing import Any
 
+import pytest
+
+from tui.bus.errors import DeviceException, LineError, NoAnswer
+from tui.session.counters.watch import CounterWatch
+
 from .commands import ended, tcp_line
 
 
@@ -47,6 +52,22 @@ def test_lost_replies_are_reported_and_exit_with_1() -> None:
 def test_drive_without_counters_is_not_compared() -> None:
     done = ended(0, "counters", "sim:atv312", "--frames", "3")
     assert "reports no counters of its own" in done.stdout
+    assert counted(0, "sim:atv312", "--frames", "3")["agree"] is None
+
+
+@pytest.mark.parametrize(
+    ("error", "status"), [(NoAnswer(1, 8, 0, "No answer."), 3), (DeviceException(1, 8, 0, 1), 4)]
+)
+def test_counters_that_cannot_be_read_are_no_difference(
+    error: LineError, status: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def fail(watch: CounterWatch) -> None:
+        raise error
+
+    monkeypatch.setattr(CounterWatch, "_look_by_diagnostics", fail)
+    found = counted(status, "sim:atv71", "--frames", "1")
+    assert found["agree"] is None
+    assert found["trouble"]
 
 
 def test_counters_of_a_drive_are_reset_only_if_armed_and_available() -> None:

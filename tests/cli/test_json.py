@@ -85,7 +85,17 @@ def test_watch_uses_the_monitoring_set_of_the_profile() -> None:
 
 def test_identify_prints_the_identity_as_json() -> None:
     who = reported("identify", *LINE)
-    keys = {"line", "device", "vendor", "reference", "version", "name", "profile", "model"}
+    keys = {
+        "line",
+        "device",
+        "vendor",
+        "reference",
+        "version",
+        "name",
+        "profile",
+        "model",
+        "candidates",
+    }
     assert set(who) == HEAD | keys | {"timeout"}
     assert (who["device"], who["profile"]) == (2, "atv71")
     assert who["reference"].startswith("ATV71")

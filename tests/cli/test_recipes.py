@@ -162,7 +162,10 @@ def test_recipes_are_made_from_the_drives_of_a_line(tmp_path: Path) -> None:
     options = [word for text in sets for word in ("--set", text)]
     with tcp_line("atv312@4", "atv312@5", "atv71@6", *options, "--any-settings") as line:
         devices = ("-d", "4", "-d", "5", "-d", "6")
-        assert "recipes of 3 drives" in run(0, "backup", line, file, "--recipe", *devices)
+        output = run(0, "backup", line, file, "--recipe", *devices)
+        assert "recipes of 3 drives.\n" in output
+        assert "hall-atv312.toml: 2 drives of Altivar 312 share " in output
+        assert "hall-atv71.toml" not in output
         output = run(0, "compare", file, line)
         assert output.count("as its recipe of") == 3
         run(0, "write", line, "dEC=9", "-d", "5", "--arm")
@@ -197,6 +200,8 @@ def test_document_of_a_recipe_is_about_each_drive(
         (1, str(tmp_path / "x-1.toml"), 1, {"SP9": "refused"}, False),
         (2, str(tmp_path / "x-2.toml"), 2, {}, False),
     ]
+    files = {(each["recipe"], each["machine"]) for each in json.loads(done.stdout)}
+    assert files == {(str(tmp_path / "x.toml"), str(tmp_path / "x-atv312.toml"))}
 
 
 def test_values_on_different_scales_are_not_shared() -> None:
@@ -208,6 +213,19 @@ def test_values_on_different_scales_are_not_shared() -> None:
     machine, rest = split_sets(profile, sets)
     assert machine.raws == {"HSP": 500}
     assert [each.raws for each in rest] == [{"Inr": 1, "ACC": 30}, {"Inr": 0, "ACC": 30}]
+
+
+def test_scale_of_an_own_setting_is_beside_it() -> None:
+    profile = library.load("atv312")
+    sets = [
+        ParameterSet(
+            SetHead("atv312", device=device), {"Inr": 1, "ACC": acc, "dEC": 30, "HSP": 500}
+        )
+        for device, acc in ((4, 30), (5, 55))
+    ]
+    machine, rest = split_sets(profile, sets)
+    assert machine.raws == {"HSP": 500}
+    assert rest[1].raws == {"Inr": 1, "ACC": 55, "dEC": 30}
 
 
 def test_backup_of_several_drives_needs_recipes(tmp_path: Path) -> None:

@@ -59,6 +59,8 @@ class ControlTaking:
     can_give_back: bool
     taken: bool | None
     """True if Modbus has control; None if no word shows it."""
+    is_given_back: bool = False
+    """True if the drive holds the word that gives control back."""
 
 
 def control_taking(profile: Profile, raws: Mapping[str, int]) -> ControlTaking | None:
@@ -73,4 +75,7 @@ def control_taking(profile: Profile, raws: Mapping[str, int]) -> ControlTaking |
             ids[order.id] = None if held is None else held == order.words[-1]
     if not ids:
         return None
-    return ControlTaking("take-control" in ids, "hand-back" in ids, ids.get("take-control"))
+    taken, is_given_back = ids.get("take-control"), ids.get("hand-back") is True
+    if taken is None and is_given_back:
+        taken = False
+    return ControlTaking("take-control" in ids, "hand-back" in ids, taken, is_given_back)

@@ -40,7 +40,8 @@ if TYPE_CHECKING:
     from ..documents.setting_documents import BackupDocument
 
 
-RECIPES_WRITTEN = "{file}: recipes of {count} drives, which share {shared} settings."
+RECIPES_WRITTEN = "{file}: recipes of {count} drives."
+SHARED = "{file}: {count} drives of {name} share {shared} settings."
 RecipeDrive = tuple["DriveSession", "ParameterSet"]
 
 
@@ -60,11 +61,20 @@ def back_up_recipes(target: Target, file: Path, *, force: bool, as_json: bool) -
     for id_ in families:
         refuse_output(_machine_file(file, id_), force=force, as_json=as_json)
     rests: dict[int, ParameterSet] = {}
-    shared = 0
+    messages = Messages(as_json=as_json)
+    shared_texts = []
     for id_, profile in families.items():
         members = [values for session, values in drives if session.profile.id == id_]
         machine, rest = split_sets(profile, members)
-        shared += len(machine.raws)
+        if len(members) > 1:
+            shared_texts.append(
+                SHARED.format(
+                    file=_machine_file(file, id_),
+                    count=len(members),
+                    name=profile.name,
+                    shared=len(machine.raws),
+                )
+            )
         write_down(_machine_file(file, id_), dump_set(profile, machine), force=force)
         rests |= {values.head.device: values for values in rest}
     rows = []
@@ -74,8 +84,8 @@ def back_up_recipes(target: Target, file: Path, *, force: bool, as_json: bool) -
         id_ = session.profile.id
         rows.append((session.device, id_, _machine_file(file, id_).name, path.name))
     write_down(file, dump_recipes(rows), force=force)
-    messages = Messages(as_json=as_json)
-    messages.tell(RECIPES_WRITTEN.format(file=file, count=len(drives), shared=shared))
+    for text in (RECIPES_WRITTEN.format(file=file, count=len(drives)), *shared_texts):
+        messages.tell(text)
     for _, values in drives:
         complain_absent(messages, values.absent)
     if as_json:
@@ -117,6 +127,8 @@ def _document(
         all=False,
         absent=dict(values.absent),
         messages=[],
+        recipe=str(file),
+        machine=str(_machine_file(file, session.profile.id)),
     )
 
 

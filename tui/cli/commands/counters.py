@@ -10,7 +10,15 @@ import click
 
 from ..shared.diagnosis_documents import counters_document
 from ..shared.drive_commands import arm_option, close_journal, journal_document, need_arming
-from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure
+from ..shared.errors import (
+    DIFFERENT,
+    DONE,
+    DRIVE_REFUSED,
+    LINE_TROUBLE,
+    REFUSED_HERE,
+    Failure,
+    end_with,
+)
 from ..shared.numbers import seconds as seconds_range
 from ..shared.options import (
     Target,
@@ -84,7 +92,7 @@ def counters(
     if reset_drive:
         need_arming(arm, "--reset-drive sets the drive's own counters to 0")
 
-    async def work(opened: OpenLine) -> bool:
+    async def work(opened: OpenLine) -> int:
         session = await connect_drive(opened, target)
         watch = CounterWatch(session)
         if reset_drive:
@@ -104,10 +112,11 @@ def counters(
                 say(difference.text)
             if found.agree and not found.trouble:
                 say(found.agreeing)
-        return found.agree and not found.trouble
+        if watch.trouble:
+            return DRIVE_REFUSED if watch.is_refused else LINE_TROUBLE
+        return DONE if found.agree else DIFFERENT
 
-    if not on_line(target, work, read_only=read_only):
-        raise click.exceptions.Exit(DIFFERENT)
+    end_with(on_line(target, work, read_only=read_only))
 
 
 async def _look(watch: CounterWatch) -> None:

@@ -18,7 +18,7 @@ from ..shared.options import (
     several_devices_option,
 )
 from ..shared.output import drive_fields
-from ..shared.pending_timeouts import look_after
+from ..shared.pending_timeouts import look_after, timeout_field
 from ..shared.registration import ON_LINE, command
 from ..shared.rows import say_row, titled
 
@@ -48,6 +48,7 @@ def identify(
 ) -> None:
     """Show a drive's identity (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
+    from tui.session.timeout_report import Timeout
 
     from ..documents.drive_documents import IdentityDocument
 
@@ -61,11 +62,12 @@ def identify(
         words = await _model_words(session)
         if not as_json:
             _say_identity(identity, words)
-        timeout = None
+        timeout = timeout_field(Timeout(known=False))
         if session is not None:
             sessions.append(session)
             await look_after(opened, session, line_text).learn()
-            timeout = drive_fields(line_text, session)["timeout"]
+            if identity.profile is not None:  # that of a guessed family may be another one
+                timeout = drive_fields(line_text, session)["timeout"]
         elif hold:
             raise Failure(
                 f"Device {drive.device} does not identify itself, so it cannot be kept alive."
@@ -82,6 +84,7 @@ def identify(
             version=identity.version,
             name=identity.name,
             model=_model(identity, words),
+            candidates=list(identity.candidates),
         )
         return document, DONE
 

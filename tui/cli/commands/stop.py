@@ -177,7 +177,7 @@ async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
 async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish) -> int:
     """Stop a drive, report the result; returns the exit status."""
     from tui.session.command.motor_stop import with_other_way
-    from tui.session.command.stop_report import Phase
+    from tui.session.command.stop_report import MAY_COAST, Phase
 
     session, order, telling = found.session, wish.order, wish.telling
     # a drive without the requested kind of stop gets the ramp stop, and the result says so
@@ -190,8 +190,11 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
     if telling.as_json:
         await PolledDrive(session, "", goes_on=True).learn()
     if report.phase is Phase.STOPPED:
-        telling.stopped(session, f"{who}: {with_other_way(report.text, order, way)}.")
-        await asyncio.to_thread(forget_start, session)
+        may_coast = report.text.startswith(MAY_COAST)
+        text = f"{who}: {with_other_way(report.text, order, way)}."
+        telling.stopped(session, text, may_coast=may_coast)
+        if not may_coast:
+            await asyncio.to_thread(forget_start, session)
         return 0
     status = await status_of_failed(session)
     profile = None if session.guessed else session.profile.id
@@ -270,15 +273,14 @@ async def give_control_back(session: DriveSession, *, arm: bool) -> str:
     from tui.session.command.commander import Commander
     from tui.session.read.reader import Reader
 
-    if not arm:
-        raise Failure(
-            f"Not given back: {WAITS}. Look at the machine first, then {GIVE_BACK_OPTION}.",
-            REFUSED_HERE,
-        )
     await Reader(session).read(deciding_codes(session.profile))
     found = taking_of(session)
     if found is None or not found.can_give_back:
         raise Failure(f"{session.profile.name} has no control to give back.", REFUSED_HERE)
+    if not arm:
+        raise Failure(
+            f"Not given back: {WAITS}. Check the machine, then {GIVE_BACK_OPTION}.", REFUSED_HERE
+        )
     journal = journal_document()
     try:
         session.arming.arm(seconds=math.inf)

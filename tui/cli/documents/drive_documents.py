@@ -104,6 +104,7 @@ class IdentityDocument(DriveDocument, kw_only=True):
     version: str
     name: str
     model: ModelField | None
+    candidates: Annotated[list[str], Meta(description="Profiles that fit the drive.")]
 
 
 class StatusDocument(DriveDocument, kw_only=True):
@@ -284,7 +285,9 @@ class CountersDocument(DriveDocument, kw_only=True):
     load: LoadField
     drive: list[DriveCountersField]
     differences: list[DifferenceField]
-    agree: bool
+    agree: Annotated[
+        bool | None, Meta(description="Null if the drive's own counters were not compared.")
+    ]
     trouble: str | None
     test: CountingTestField
     reset: bool
@@ -299,7 +302,10 @@ class CommandDocument(DriveDocument, kw_only=True):
 
 
 class StopDocument(Document, kw_only=True):
-    """`stop`: the result for one drive; a list with --all or several -d."""
+    """`stop`: the result for one drive; a list with --all or several -d.
+
+    `stopped` is true if the output is at 0 Hz and the drive is not enabled.
+    """
 
     command: Literal["stop"] = "stop"
     line: str
@@ -307,6 +313,10 @@ class StopDocument(Document, kw_only=True):
     profile: str | None
     first: list[FirstWordField] | UnsetType = UNSET
     stopped: bool
+    may_coast: Annotated[
+        bool | UnsetType,
+        Meta(description="Nothing brakes the motor, which may still turn; only if `stopped`."),
+    ] = UNSET
     text: str
     status: int
     timeout: TimeoutField | UnsetType | None = UNSET

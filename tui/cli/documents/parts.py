@@ -327,4 +327,4 @@ class OldTimeoutField(DocumentPart):
     timeout_s: float
     reaction: str | None
     does: str | None
-    begun: bool
+    begun: bool | None

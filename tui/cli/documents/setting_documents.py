@@ -48,6 +48,12 @@ class BackupDocument(DriveDocument, kw_only=True):
     all: bool
     absent: dict[str, str]
     messages: list[str]
+    recipe: Annotated[
+        str | UnsetType, Meta(description="The file of recipes; only with --recipe.")
+    ] = UNSET
+    machine: Annotated[
+        str | UnsetType, Meta(description="The set of the drives of one family, for --recipe.")
+    ] = UNSET
 
 
 class ReportDocument(DriveDocument, kw_only=True):

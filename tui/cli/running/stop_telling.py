@@ -50,14 +50,15 @@ class StopTelling:
             for sent_word in sent
         ]
 
-    def stopped(self, session: DriveSession, text: str) -> None:
-        """A motor is at standstill."""
+    def stopped(self, session: DriveSession, text: str, *, may_coast: bool) -> None:
+        """A motor is at standstill, or `may_coast` without current."""
         from tui.session.monitor.timeout import timeout_now
 
         if not self.as_json:
             with suppress(OSError):  # a reader that went away must not end the other stops
                 say(text)
         self._keep(session.device, session.profile.id, text, DONE)
+        self.documents[-1].may_coast = may_coast
         self.documents[-1].timeout = timeout_field(timeout_now(session))
 
     def failed(self, device: int, profile: str | None, text: str, status: int) -> None:

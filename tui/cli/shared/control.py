@@ -44,7 +44,7 @@ def control_row(session: DriveSession) -> list[tuple[str, str]]:
         return []
     if found.can_take and found.taken is False:
         return [("Control", f"not taken by the line: {TAKES}")]
-    if not found.can_give_back:
+    if not found.can_give_back or found.is_given_back:
         return []
     return [("Control", f"taken by the line: {GIVES_BACK}" if found.taken else GIVES_BACK)]
 

@@ -165,7 +165,7 @@ def counters_document(
             DifferenceField(kind=item.kind, count=item.count, text=item.text)
             for item in found.differences
         ],
-        agree=found.agree,
+        agree=False if found.differences else True if found.compared else None,
         trouble=found.trouble or None,
         test=CountingTestField(frames=frames, answered=answered),
         reset=reset,

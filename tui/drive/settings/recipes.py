@@ -194,7 +194,8 @@ def split_sets(
     """Return the set that drives of one family share, and the rest of each.
 
     Shared are settings with one value in all of them, on one scale. Motor data, ratings and line
-    settings stay with each drive.
+    settings stay with each drive. So do the sources of scales of the settings in a rest: without
+    them, a person could not edit its values in their units.
     """
     first = sets[0]
     shared = {
@@ -203,11 +204,24 @@ def split_sets(
         if not belongs_to_drive(profile, code) and all(s.raws.get(code) == raw for s in sets)
     }
     # a raw value means the same only if its scale is the same in all drives
-    while apart := [c for c in shared if any(s not in shared for s in depends_on(profile[c]))]:
+    while apart := [*_on_own_scale(profile, shared), *_scales_of_rests(profile, sets, shared)]:
         for code in apart:
-            del shared[code]
+            shared.pop(code, None)
     head = replace(first.head, line="", device=0, identity={})
     return ParameterSet(head, shared), [_without(each, shared) for each in sets]
+
+
+def _on_own_scale(profile: Profile, shared: Collection[str]) -> list[str]:
+    """Return the shared settings whose scale is not shared."""
+    return [code for code in shared if any(s not in shared for s in depends_on(profile[code]))]
+
+
+def _scales_of_rests(
+    profile: Profile, sets: Sequence[ParameterSet], shared: Collection[str]
+) -> list[str]:
+    """Return the shared sources of scales of settings that are not shared."""
+    own = {code for each in sets for code in each.raws if code not in shared}
+    return list({source for code in own for source in depends_on(profile[code])} & {*shared})
 
 
 def dump_recipes(rows: Sequence[tuple[int, str, str, str]]) -> str:

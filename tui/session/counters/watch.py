@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from tui.bus.api import DeviceCounters, LastMinute, LineCounters, Priority
-from tui.bus.errors import LineError, RequestRefused
+from tui.bus.errors import DeviceException, LineError, RequestRefused
 from tui.bus.link import TcpLink
 from tui.bus.trace import Frame
 from tui.drive.chart import watched_codes
@@ -129,6 +129,8 @@ class CounterWatch:
 
     session: DriveSession
     trouble: str = ""
+    is_refused: bool = False
+    """True if `trouble` is a refusal of the drive."""
     _line: LineCounters = field(init=False)
     """Counts of the line at the last reset."""
     _begun: float = field(init=False)
@@ -199,7 +201,7 @@ class CounterWatch:
 
     async def look(self) -> None:
         """Read the drive's own counters; an error of the line is stored in `trouble`."""
-        self.trouble = ""
+        self.trouble, self.is_refused = "", False
         if not self._looked:
             # both sides must begin at the same time
             self._looked = True
@@ -210,7 +212,7 @@ class CounterWatch:
             for port in self.session.profile.data.port_counters:
                 await self._take(port.name, partial(self._port_counts, port))
         except LineError as error:
-            self.trouble = str(error)
+            self.trouble, self.is_refused = str(error), isinstance(error, DeviceException)
 
     async def _look_by_diagnostics(self) -> None:
         line, device = self.session.line, self.session.device
