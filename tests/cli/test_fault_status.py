@@ -91,7 +91,7 @@ async def test_fault_has_causes_checks_and_live_values() -> None:
         "(public guide)",
         "check: Increase DEC; ",
         "(general practice)",
-        "look at: DEC 0.5 s, the active ramp",
+        "check: DEC 0.5 s, the active ramp",
         "reset: a fault reset works now, as the drive reports. ",
     ):
         assert part in text
@@ -158,7 +158,7 @@ async def test_alarm_has_causes_but_no_reset() -> None:
     rows = text_of(status).splitlines()
     at = rows.index("Alarms: Undervoltage alarm")
     assert rows[at + 1] == "  probably: Undervoltage alarm: Mains low or a dip (general practice)"
-    assert any(row.startswith("  look at: ULN 2") for row in rows)
+    assert any(row.startswith("  check: ULN 2") for row in rows)
     assert not any(row.startswith("  reset") for row in rows)
 
 

@@ -58,7 +58,7 @@ def test_warning_names_drive_timeout_reaction_and_remedy(
         " Switches the output off and trips with Err5; the motor coasts.\n"
         f"To keep polling it: drivepanel hold {atv21} -d 1." in done.stderr
     )
-    assert done.stderr.endswith("After a trip: drivepanel reset.\n")
+    assert done.stderr.endswith(f"After a trip: drivepanel reset {atv21} -d 1 --arm.\n")
 
 
 @pytest.mark.parametrize("command", READING)
@@ -96,8 +96,10 @@ def test_drive_that_refuses_the_timeout_words_fails_no_command() -> None:
 def test_timeout_that_starts_with_a_command_is_reported_after_one() -> None:
     with tcp_line("atv71@1", "--set", "TTO=300") as line:
         done = ended(0, "read", line, "ETA", "--json")
-        assert done.stderr == ""
-        assert json.loads(done.stdout)["timeout"]["begun"] is False
+        assert "TTO may run: it begins with the first command or reference. Aft" in done.stderr
+        assert "After a trip: drivepanel reset tcp:" in done.stderr
+        assert done.stderr.endswith(" -d 1 --arm.\n")
+        assert json.loads(done.stdout)["timeout"]["begun"] is None
         put(line, CMD, 6)  # by another master
         done = ended(0, "read", line, "ETA", "--json")
         assert "timeout TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
@@ -121,14 +123,14 @@ def test_ignored_communication_loss_has_no_warning() -> None:
 def test_undocumented_reaction_is_not_reported_as_certain() -> None:
     with tcp_line("atv31@1") as line:
         output = ended(0, "read", line, "ETA").stderr
-        assert "timeout ttO runs (when it begins is in no document). After 10 s" in output
+        assert "timeout ttO may run: no document states when it begins. After 10 s" in output
 
 
 def test_warning_repeats_the_family_that_was_typed() -> None:
     with tcp_line("powerdrive@1", "--set", "11.63=20") as line:
         output = ended(0, "read", line, "10.40", "-p", "powerdrive").stderr
         assert f"drivepanel hold {line} -d 1 -p powerdrive." in output
-        assert "timeout 11.63 runs" in output
+        assert "timeout 11.63 may run: no document states when" in output
 
 
 @pytest.mark.sweep

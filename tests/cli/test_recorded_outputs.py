@@ -30,6 +30,7 @@ CHANGING = (
     (r"\b\d\d:\d\d(:\d\d(\.\d+)?)?\b", "TIME"),
     (r"\b\d+(\.\d+)? ?(ms|s|min|h|%)(?!\w)", r"N \2"),
     (rf'("\w*({KEYS})"): -?[\d.e-]+', r"\1: N"),
+    (r'"(us|one_by_one_us)": \d+', r'"\1": N'),
     (r"pid \d+", "pid N"),
     (r"\b\d+\.\d{5,}", "N"),
     (r"/[^ ]*/drivepanel-\w{8}/", "OWN/"),

@@ -34,12 +34,15 @@ from tui.cli.shared.drive_status import (
     status_document,
     status_of_drive,
     status_table,
-    watch_field,
-    watch_text,
 )
 from tui.cli.shared.left_behind import LeftBehind
 from tui.cli.shared.output import drive_fields, json_text
-from tui.cli.shared.pending_timeouts import timeout_field, timeout_warning
+from tui.cli.shared.pending_timeouts import (
+    timeout_field,
+    timeout_warning,
+    watch_field,
+    watch_text,
+)
 from tui.cli.shared.status_words import eeprom_field, eeprom_rows
 from tui.drive.errors import DriveError
 from tui.drive.profile import library

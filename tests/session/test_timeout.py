@@ -200,6 +200,8 @@ async def test_timeout_that_begins_with_a_command_is_known(
     watch = (await reported(session)).watch
     assert watch is not None
     assert watch.active is begun
+    # a reset or a reference of 0 begins it, too, and leaves no trace
+    assert watch.begun is (True if begun else None)
     assert has_begun(session) is begun
 
 

@@ -14,13 +14,21 @@ class TimeoutWatch:
     timeout: float
     reaction: Reaction | None
     active: bool = True
-    """False if the reaction is off, or begins with the first command and none was written."""
+    """False if the reaction is off, or begins with the first command and none is known."""
     code: str = ""
     """Code of the parameter that sets the timeout."""
     fault: str = ""
     """Fault code of the reaction; empty if it causes no fault, or an unknown one."""
     sure: bool = True
     """True if a document states when it begins; if none does, it counts as begun."""
+
+    @property
+    def begun(self) -> bool | None:
+        """True if it runs, False if its reaction is off; None if it may run.
+
+        A reset, a freewheel or a reference of 0 begins it and leaves no trace in the drive.
+        """
+        return True if self.active else None if self.acts else False
 
     @property
     def acts(self) -> bool:

@@ -14,15 +14,24 @@ from tui.drive.command_blocked import blocked_reason, state_refusal
 from tui.drive.communication_words import communication_words
 from tui.drive.hints import alarm_words
 from tui.drive.orders import chart_in_force, deciding_codes, interlock_codes
-from tui.drive.sentences import sentence
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.clock import patience
 from tui.session.reading import Reading, with_text
 
 from .control import control_field, control_row
-from .errors import DONE, LINE_TROUBLE
-from .fault_output import FaultFinding, alarm_field, fault_field, fault_rows, find_out
+from .errors import DONE, DRIVE_REFUSED, LINE_TROUBLE
+from .fault_output import (
+    FaultFinding,
+    alarm_field,
+    alarms_text,
+    direction_row,
+    fault_field,
+    fault_rows,
+    fault_text,
+    find_out,
+)
 from .left_behind import LeftBehind, left_behind
+from .pending_timeouts import timeout_field, watch_field, watch_text
 from .rows import Column
 from .status_words import eeprom_counts, eeprom_field, eeprom_rows, word_fields, word_rows
 
@@ -37,7 +46,7 @@ if TYPE_CHECKING:
     from tui.session.timeout_report import Timeout, TimeoutWatch
 
     from ..documents.drive_documents import StatusDocument
-    from ..documents.parts import OldTimeoutField, ValueField
+    from ..documents.parts import ValueField
 
 log = logging.getLogger(__name__)
 
@@ -92,9 +101,14 @@ class Status:
     eeprom: DriveCounts | None = None
     """Writes to its EEPROM; None if they cannot be read."""
 
+    refused_words: Sequence[str] = ()
+    """Those of `unread` that show the state or the fault, and that the drive refused."""
+
     @property
     def status(self) -> int:
-        """The exit status: 3 if something could not be read."""
+        """The exit status: 3 if something could not be read, 4 if the drive refused its state."""
+        if self.refused_words:
+            return DRIVE_REFUSED
         return LINE_TROUBLE if self.unread else DONE
 
 
@@ -123,11 +137,6 @@ def _text(reading: Reading | None) -> str:
     text = f"{reading.text} {reading.unit}".strip()
     is_taught = reading.value is not None and reading.value.taught
     return f"{text} taught" if is_taught else text
-
-
-def fault_text(state: DriveState) -> str:
-    """The fault that a drive is in, with its name; empty where it is in none."""
-    return f"{state.fault.code}, {state.fault.name}" if state.fault else ""
 
 
 async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
@@ -169,14 +178,28 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
         watch = timeout.watch
     elif is_late:
         unread.append(rules.timeout if rules is not None else "")
+    refused_words = _refused_words(profile, state, readings)
+    unread += [code for code in refused_words if code not in unread]
     channels = _channels(profile, readings, state)
     switches = switch_texts(profile, session.image.raws)
     refused = _refused(session)
     left = await asyncio.to_thread(left_behind, session, state.motion)
     return Status(
         session, state, readings, channels, switches, refused, watch, timeout, left, finding,
-        unread, await eeprom_counts(session, fleet.journal),
+        unread, await eeprom_counts(session, fleet.journal), refused_words,
     )  # fmt: skip
+
+
+def _refused_words(
+    profile: Profile, state: DriveState, readings: Mapping[str, Reading]
+) -> list[str]:
+    """Return the codes without which the state or the fault is not known, and that were refused."""
+    codes: list[str] = []
+    if state.kind == "unknown":
+        codes += watched_codes(profile)
+    elif state.kind == "fault" and state.fault is None:
+        codes.append(profile.data.faults.parameter)
+    return [c for c in codes if (reading := readings.get(c)) is not None and reading.raw is None]
 
 
 def _codes(profile: Profile) -> list[str]:
@@ -208,6 +231,17 @@ def _channels(
     return found
 
 
+def _channel_rows(profile: Profile, channels: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Return a row for each channel; none for one that the family does not report."""
+    shown = {
+        "Commanded by": profile.data.channels.command
+        or profile.quantity("command_channel")
+        or any(chart.channel for chart in profile.data.charts),
+        "Reference from": profile.data.channels.reference or profile.quantity("reference_channel"),
+    }
+    return [(name, text or "not known") for name, text in channels.items() if text or shown[name]]
+
+
 def _refused(session: DriveSession) -> str:
     from tui.session.command.unblock_hint import block_reason_text
 
@@ -230,7 +264,6 @@ def status_document(line_text: str, status: Status) -> StatusDocument:
     from ..documents.drive_documents import StatusDocument
     from ..documents.parts import LeftBehindDocument, StateField
     from .output import drive_fields
-    from .pending_timeouts import timeout_field
 
     state = status.state
     fields = drive_fields(line_text, status.session)
@@ -282,13 +315,13 @@ def status_table(status: Status) -> list[tuple[str, str]]:
     return [
         ("Device", f"{status.session.device}, {profile.name}"),
         ("State", f"{state.headline} ({state.name})"),
-        ("Direction", state.direction or ""),
+        *direction_row(profile, state),
         *([("Left behind", status.left.sentence(status.session.line_text))] if status.left else []),
-        ("Fault", fault_text(state) or "none"),
+        ("Fault", fault_text(profile, state) or "none"),
         *([] if is_alarm else found),
-        ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
+        ("Alarms", alarms_text(profile, state, status.readings)),
         *(found if is_alarm else []),
-        *status.channels.items(),
+        *_channel_rows(profile, status.channels),
         *(("Besides", text) for text in status.switches),
         ("Commands", status.refused or "commands can have an effect"),
         ("Comm. timeout", _time_out_text(status)),
@@ -317,32 +350,7 @@ def drive_cells(status: Status) -> tuple[str, ...]:
     shown = shown_values(session.profile, status.readings)
     figures = (shown.get(name, NOT_AVAILABLE) for name in LINE_FIGURES)
     name = session.known_identity.reference or session.profile.name
-    return (str(session.device), name, state.headline, *figures, fault_text(state))
-
-
-def watch_field(watch: TimeoutWatch | None) -> OldTimeoutField | None:
-    """A drive's watch over the line; null where it has none."""
-    from ..documents.parts import OldTimeoutField
-
-    if watch is None:
-        return None
-    return OldTimeoutField(
-        timeout_s=watch.timeout,
-        reaction=watch.reaction.name if watch.reaction else None,
-        does=watch.reaction.does if watch.reaction else None,
-        begun=watch.active,
-    )
-
-
-def watch_text(watch: TimeoutWatch | None) -> str:
-    """Return a drive's reaction to loss of communication, for a person."""
-    if watch is None:
-        return "none: it goes on without communication"
-    if watch.reaction is not None and not watch.acts:
-        return f"off ({watch.reaction.name}): it goes on without communication"
-    reaction = sentence(watch.reaction.does) if watch.reaction else "Its own reaction follows."
-    text = f"{watch.timeout:g} s. {reaction}"
-    return text if watch.active else f"{text} It begins with the first command or reference."
+    return (str(session.device), name, state.headline, *figures, fault_text(session.profile, state))
 
 
 async def read_until(

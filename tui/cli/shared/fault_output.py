@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypedDict
 
+from tui.drive.chart import fault_code
 from tui.drive.fault_reset import reset_codes, reset_follows
 from tui.drive.hints import (
     TRUST,
@@ -13,6 +14,7 @@ from tui.drive.hints import (
     FaultAdvice,
     ResetText,
     advice_now,
+    alarm_words,
     alarms_on,
     codes_to_read,
     reset_ready,
@@ -30,6 +32,7 @@ if TYPE_CHECKING:
     from ..documents.parts import AlarmField, ExcludedPart, FaultField, LookField, ResetField
 
 RESET_BY = "a fault reset"
+ALL_RULED_OUT = "All listed causes are ruled out."
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,6 +69,39 @@ class FaultFinding:
         """The motor's reaction to a reset now, with the inputs that are closed."""
         raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
         return reset_follows(self.profile, raws, raws)
+
+
+def fault_text(profile: Profile, state: DriveState) -> str:
+    """Return the present fault with its name; empty without one. It says if it is not known."""
+    faults = profile.data.faults
+    if state.fault is not None:
+        return f"{state.fault.code}, {state.fault.name}"
+    if state.kind == "fault":
+        is_unread = faults.parameter and state.fault_raw is None
+        return "code not read" if is_unread else "no code reported"
+    excluded = fault_code(profile) and state.fault_raw == faults.none
+    return "not known" if state.kind == "unknown" and not excluded else ""
+
+
+def alarms_text(profile: Profile, state: DriveState, readings: Mapping[str, Reading]) -> str:
+    """Return the present alarms; "none" only if every word that shows alarms was read."""
+    if state.alarms:
+        return ", ".join(bit.name for bit in state.alarms)
+    if state.alarm:
+        return "shown by the status word"
+    words = alarm_words(profile)
+    is_marked = any(chart.alarm for chart in profile.data.charts)
+    good = {code for code, reading in readings.items() if reading.quality is Quality.GOOD}
+    if not good.issuperset(words) or (is_marked and state.kind == "unknown"):
+        return "not known"
+    return "none" if words or is_marked else "not reported by this drive"
+
+
+def direction_row(profile: Profile, state: DriveState) -> list[tuple[str, str]]:
+    """Return the row of the direction; none if the family does not report it."""
+    if state.direction is None and not any(chart.direction for chart in profile.data.charts):
+        return []
+    return [("Direction", state.direction or "not known")]
 
 
 async def find_out(
@@ -189,17 +225,23 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
     rows: list[tuple[str, str]] = []
     hint, left = found.hint, found.advice
     if hint is not None and left is not None:
-        causes = "; ".join(left.probable) or "no cause is left"
-        probably = f"{causes} ({TRUST[left.confidence]})"
+        causes = "; ".join(left.probable)
+        probably = f"{causes} ({TRUST[left.confidence]})" if causes else ALL_RULED_OUT
         rows.append(("  probably", f"{found.alarm}: {probably}" if found.alarm else probably))
         rows += [("  supported", f"{advice.text}: {advice.reason}") for advice in left.supported]
         if left.check:
             rows.append(("  check", f"{'; '.join(left.check)} ({TRUST['practice']})"))
-        rows += [("  ruled out", f"{advice.text}: {advice.reason}") for advice in left.excluded]
+        rows += [
+            (
+                "  not needed" if advice.text not in hint.probable else "  ruled out",
+                f"{advice.text}: {advice.reason.removeprefix('ruled out, ')}",
+            )
+            for advice in left.excluded
+        ]
         for look in hint.look_at:
             reading = found.readings.get(look.code)
             value = f"{reading.text} {reading.unit}".rstrip() if reading else "-----"
-            rows.append(("  look at", f"{look.code} {value}, {look.why}"))
+            rows.append(("  check", f"{look.code} {value}, {look.why}"))
     elif found.profile.guide.trouble:
         rows.append(("  probably", found.profile.guide.trouble))
     if not found.alarm:

@@ -17,9 +17,10 @@ from .say import say
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.timeout_report import Timeout
+    from tui.session.timeout_report import Timeout, TimeoutWatch
 
     from ..documents.document import TimeoutField
+    from ..documents.parts import OldTimeoutField
 
 TIMEOUT_READ_WITHIN = 3.0
 """Seconds in which a drive reports its timeout at the end of a command, on a quick line."""
@@ -74,13 +75,20 @@ class PolledDrive:
                 say(f"drivepanel: {text}", err=True)
 
 
+BEGINS_WITH_A_COMMAND = (
+    "It begins with the first command or reference; it is not known if there was one."
+)
 _RUNS = (
     "{drive}: its communication timeout {code} runs. After {timeout:g} s without a request:"
     " {reaction}"
 )
 _RUNS_UNSURE = (
-    "{drive}: its communication timeout {code} runs (when it begins is in no document). After"
+    "{drive}: its communication timeout {code} may run: no document states when it begins. After"
     " {timeout:g} s without a request: {reaction}"
+)
+_MAY_HAVE_BEGUN = (
+    "{drive}: its communication timeout {code} may run: it begins with the first command or"
+    " reference. After {timeout:g} s without a request: {reaction}"
 )
 
 
@@ -93,22 +101,27 @@ def timeout_warning(session: DriveSession, found: Timeout, line_text: str) -> st
             f"\nTo keep polling it: {hold_text(session, line_text)}."
         )
     watch = found.watch
-    if watch is None or not watch.active:
+    if watch is None or watch.begun is False:
         return ""
     does = sentence(watch.reaction.does) if watch.reaction else "Its own reaction follows."
-    text = (_RUNS if watch.sure else _RUNS_UNSURE).format(
-        drive=who, code=watch.code, timeout=watch.timeout, reaction=does
-    )
+    runs = _MAY_HAVE_BEGUN if watch.begun is None else _RUNS if watch.sure else _RUNS_UNSURE
+    text = runs.format(drive=who, code=watch.code, timeout=watch.timeout, reaction=does)
     text = f"{text}\nTo keep polling it: {hold_text(session, line_text)}."
-    return f"{text} After a trip: drivepanel reset." if watch.trips else text
+    reset = drive_command("reset", session, line_text)
+    return f"{text} After a trip: {reset}." if watch.trips else text
 
 
 def hold_text(session: DriveSession, line_text: str) -> str:
     """The command that keeps polling a drive."""
-    words = ["drivepanel", "hold", shlex.quote(line_text), "-d", str(session.device)]
+    return drive_command("hold", session, line_text)
+
+
+def drive_command(name: str, session: DriveSession, line_text: str) -> str:
+    """Return a complete command for a drive, as a person types it."""
+    words = ["drivepanel", name, shlex.quote(line_text), "-d", str(session.device)]
     if session.known_identity.profile != session.profile.id:
         words += ["-p", session.profile.id]
-    return " ".join(words)
+    return " ".join([*words, *(["--arm"] if name == "reset" else [])])
 
 
 def timeout_field(found: Timeout) -> TimeoutField | None:
@@ -126,8 +139,33 @@ def timeout_field(found: Timeout) -> TimeoutField | None:
         seconds=watch.timeout,
         reaction=watch.reaction.name if watch.reaction else None,
         fault=watch.fault or None,
-        begun=watch.active,
+        begun=watch.begun,
     )
+
+
+def watch_field(watch: TimeoutWatch | None) -> OldTimeoutField | None:
+    """A drive's watch over the line; null where it has none."""
+    from ..documents.parts import OldTimeoutField
+
+    if watch is None:
+        return None
+    return OldTimeoutField(
+        timeout_s=watch.timeout,
+        reaction=watch.reaction.name if watch.reaction else None,
+        does=watch.reaction.does if watch.reaction else None,
+        begun=watch.begun,
+    )
+
+
+def watch_text(watch: TimeoutWatch | None) -> str:
+    """Return a drive's reaction to loss of communication, for a person."""
+    if watch is None:
+        return "none: it goes on without communication"
+    if watch.reaction is not None and not watch.acts:
+        return f"off ({watch.reaction.name}): it goes on without communication"
+    reaction = sentence(watch.reaction.does) if watch.reaction else "Its own reaction follows."
+    text = f"{watch.timeout:g} s. {reaction}"
+    return text if watch.active else f"{text} {BEGINS_WITH_A_COMMAND}"
 
 
 def look_after(opened: OpenLine, session: DriveSession, line_text: str) -> PolledDrive:

@@ -139,14 +139,17 @@ def timeout_now(session: DriveSession) -> Timeout:
 def has_begun(session: DriveSession) -> bool:
     """Return True if a drive's communication timeout has begun, as far as known.
 
-    In some families it begins when any master writes a command or reference. The command word in
-    the drive shows such a write, and this program knows its own.
+    In some families it begins when any master writes a command or reference. A word in the drive
+    that is not 0 shows such a write, and this program knows its own.
     """
     rules = session.profile.data.communication_fault
     if rules is None or not rules.needs_write or session.reported_by_line:
         return True
     raws = session.image.trusted
-    return any(raws.get(chart.command) for chart in session.profile.data.charts)
+    profile = session.profile
+    written = [chart.command for chart in profile.data.charts]
+    written += [reference.parameter for reference in profile.data.references]
+    return any(raws.get(code) for code in written)
 
 
 def timeout_seconds(reading: Reading, off: int | None) -> float | None:
