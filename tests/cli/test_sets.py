@@ -68,7 +68,7 @@ def test_changed_setting_is_restored_from_a_backup(line: str, tmp_path: Path) ->
     assert "| yes | ACC |" in run(1, "compare", file, line, "-d", "2", "--format", "markdown")
     assert "2 to write" in run(0, "restore", line, file, "-d", "2", "--dry-run")
     run(1, "compare", file, line, "-d", "2")
-    assert "Wrote 2, all verified; 0 not written." in run(
+    assert "Wrote 2, all verified. 0 not written." in run(
         0, "restore", line, file, "-d", "2", "--arm"
     )
     run(0, "compare", file, line, "-d", "2")
@@ -237,6 +237,17 @@ def test_repeated_code_exits_with_2(line: str) -> None:
         2, "write", line, "-d", "2", "ACC=3", "W9001=4", "--arm"
     )
     assert re.search(r"ACC .* 3\.0 +s ", run(0, "read", line, "ACC", "-d", "2"))
+
+
+def test_dry_run_holds_back_what_the_real_run_would(line: str) -> None:
+    words = ("write", line, "HSP=70", "LSP=55", "-d", "2")
+    done = ended(2, *words, "--dry-run", "--json")
+    results = json.loads(done.stdout)["results"]
+    assert {each["code"]: each["outcome"] for each in results} == {
+        "HSP": "refused", "LSP": "held-back",
+    }  # fmt: skip
+    assert "LSP depends on HSP, which would not be written." in done.stdout
+    assert "LSP was not written: it depends on HSP" in ended(2, *words, "--arm").stderr
 
 
 def test_rounding_of_a_set_is_reported(line: str, tmp_path: Path) -> None:
@@ -413,7 +424,7 @@ def test_one_set_is_restored_to_several_drives(tmp_path: Path) -> None:
         reported = run(0, "restore", line, file, "-d", "1", "-d", "2", "--arm")
         assert "Device 1:" in reported
         assert (
-            reported.index("Nothing written")
+            reported.index("The drive holds these values already.")
             < reported.index("Device 2:")
             < reported.index("Wrote 2")
         )
@@ -504,7 +515,7 @@ def test_nothing_to_write_is_no_refusal_on_a_read_only_line(tmp_path: Path) -> N
     assert acceleration is not None
     same = f"ACC={acceleration[1]}"
     assert "holds these values already" in run(0, "write", line, same, "--arm", "--read-only")
-    assert "0 not written" in run(0, "restore", line, file, "--arm", "--read-only")
+    assert "holds these values already" in run(0, "restore", line, file, "--arm", "--read-only")
     for command in (("write", line, "ACC=7.7"), ("write", line, same, "--save"),
                     ("restore", line, file, "--save")):  # fmt: skip
         assert "is read-only" in refused(5, *command, "--arm", "--read-only")

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.settings.applied import Result
+    from tui.session.settings.restore import Restored
 
     from ..documents.parts import EditField, PlanItemField
     from ..documents.setting_documents import RestoreDocument
@@ -313,7 +314,7 @@ async def _restore(
         if len(plan.edits) or save:
             raise RequestRefused("The line is read-only: nothing is written.")
         say_plan_left_out(plan, messages)
-        messages.tell(_WROTE_NOTHING.format(left=0))
+        messages.tell(_nothing_text(plan))
         return _restored(plan), DONE
     if interrupted_before := Mark.of(session).interrupted:
         messages.tell(interrupted_before)
@@ -337,9 +338,7 @@ async def _restore(
         if saved:
             messages.tell(await save_to_eeprom(session, journal, permit, gate))
         say_afterwards(messages, session.profile, done.after_reset, done.unsaved, saved=saved)
-        written = sum(result.done for result in done.results)
-        text = _WROTE if written else _WROTE_NOTHING
-        messages.tell(text.format(count=written, left=len(done.left)))
+        messages.tell(_result_text(done))
         if done.unseen:
             messages.complain(f"Not all of it was seen again: {done.unseen}")
         if not done.complete:
@@ -352,8 +351,22 @@ async def _restore(
     return found, DONE if done.complete else status_of_results(done.results) or DRIVE_REFUSED
 
 
-_WROTE = "Wrote {count}, all verified; {left} not written."
-_WROTE_NOTHING = "Nothing written; {left} not written."
+HOLDS_ALREADY = "The drive holds these values already."
+
+
+def _nothing_text(plan: RestorePlan) -> str:
+    """Return the result of a plan without a value to write."""
+    return HOLDS_ALREADY if any(plan.items_of_kind("equal")) else "Nothing written."
+
+
+def _result_text(done: Restored) -> str:
+    """Return how many settings were written, and how many of the set were not."""
+    from tui.session.settings.applied import done_text
+
+    wrote = done_text((result for result in done.results if result.done), seen=not done.unseen)
+    if done.complete and not wrote:
+        return _nothing_text(done.plan)
+    return f"{wrote or 'Nothing written.'} {len(done.left)} not written."
 
 
 def say_plan_left_out(plan: RestorePlan, messages: Messages) -> None:

@@ -52,6 +52,9 @@ if TYPE_CHECKING:
     from ..documents.parts import EditField, OutcomeText
 
 
+HELD_BACK = "{code} depends on {base}, which would not be written."
+
+
 class _Written(TypedDict):
     """The fields of the document about the results."""
 
@@ -180,28 +183,47 @@ async def _staged(
 
 async def _tell(session: DriveSession, edits: Edits, messages: Messages) -> tuple[_Written, int]:
     """Show what would be written; the same for JSON, and the exit status."""
-    past = await _past_limits(session, edits)
+    past, held_back = await _past_limits(session, edits)
     rows = []
     for edit in edits:
-        why = past.get(edit.code)
+        why = past.get(edit.code) or held_back.get(edit.code)
         text = f"write  {edit.code}: {edit.old_text} -> {edit.text}"
         messages.tell(text if why is None else f"refuse {why}")
         outcome: OutcomeText = "would-write" if why is None else "refused"
+        if edit.code in held_back:
+            outcome = "held-back"
         rows.append(edit_field(edit, outcome=outcome, held=edit.old, text=why or text))
     found: _Written = {"results": rows, "saved": False, "after_reset": [], "unsaved": []}
     return found, USAGE if past else DONE
 
 
-async def _past_limits(session: DriveSession, edits: Edits) -> dict[str, str]:
-    """By code, why an edit would be refused: a limit that another parameter sets."""
-    from tui.drive.settings.limits import edit_problems, limit_sources
+async def _past_limits(
+    session: DriveSession, edits: Edits
+) -> tuple[dict[str, str], dict[str, str]]:
+    """Return why edits would be refused by limits of others, then why edits would be held back.
+
+    Both are by code. An edit is held back if it depends on one that would not be written.
+    """
+    from tui.drive.settings.limits import builds_on, edit_problems, limit_sources
     from tui.drive.shown import depends_on
     from tui.session.read.retrying_reader import RetryingReader
 
     profile, codes = session.profile, {edit.code for edit in edits}
     codes |= limit_sources(profile, codes)
     codes |= {code for text in codes for code in depends_on(profile[text])}
-    return edit_problems(profile, edits, await RetryingReader(session).ask_many(sorted(codes)))
+    raws = await RetryingReader(session).ask_many(sorted(codes))
+    past = edit_problems(profile, edits, raws)
+    held_back: dict[str, str] = {}
+    while True:
+        missed = {*past, *held_back}
+        more = {
+            edit.code: HELD_BACK.format(code=edit.code, base=base)
+            for edit in edits
+            if edit.code not in missed and (base := builds_on(profile, edit, missed, edits, raws))
+        }
+        if not more:
+            return past, held_back
+        held_back |= more
 
 
 async def _write(

@@ -226,12 +226,19 @@ class ResultTelling:
 
     def interrupted(self) -> Failure:
         """The failure after Ctrl-C, with the written settings and the unknown ones."""
-        written = [code for code, result in self.results.items() if result.done]
+        from tui.session.settings.applied import EditOutcome
+
+        outcomes = {code: result.outcome for code, result in self.results.items()}
+        written = [code for code, outcome in outcomes.items() if outcome is EditOutcome.DONE]
         if not self.results:
             text = "Ended by Ctrl-C. The first setting may have been written: read it."
             return Failure(text, INTERRUPTED)
         count, names = len(written), ", ".join(written) or "none"
         text = f"Ended by Ctrl-C: {count} of {self._of} written: {names}."
+        if sent := ", ".join(c for c, o in outcomes.items() if o is EditOutcome.SENT):
+            text = f"{text} Sent, not verified: {sent}."
+        if unknown := ", ".join(c for c, o in outcomes.items() if o is EditOutcome.UNKNOWN):
+            text = f"{text} May have been written: {unknown}. Read it."
         if len(self.results) < self._of:
             text = f"{text} The next one may have been written too: read it."
         return Failure(text, INTERRUPTED)

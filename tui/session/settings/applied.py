@@ -80,13 +80,16 @@ class Applied:
         return tuple(result for result in self.results if result.done)
 
 
-def done_text(done: Iterable[Result]) -> str:
-    """Return how many of these edits were written, only sent, or already held; empty if none."""
+def done_text(done: Iterable[Result], *, seen: bool = True) -> str:
+    """Return how many of these edits were written, only sent, or already held; empty if none.
+
+    Without `seen` they were read back, but not all were seen again at the end.
+    """
     results = list(done)
     unchanged = sum(result.unchanged for result in results)
     sent = sum(result.outcome is EditOutcome.SENT for result in results)
     written = len(results) - sent - unchanged
-    parts = [f"Wrote {written}, all verified."] if written else []
+    parts = [f"Wrote {written}{', all verified' if seen else ''}."] if written else []
     parts += [f"Sent {sent}, not verified."] if sent else []
     parts += [f"Already held: {unchanged}."] if unchanged else []
     return " ".join(parts)
