@@ -98,7 +98,7 @@ def test_json_after_a_write_is_one_document(line: str) -> None:
         (("set", "NMA3=NOPE", "--arm"), 2, "no parameter"),
         (("set", "NMA3", "--arm"), 2, "SLOT=CODE"),
         (("set", "--arm"), 2, "set needs"),
-        (("show", "NMA3"), 2, "nothing behind"),
+        (("show", "NMA3"), 2, "no further words"),
         (("load", "no-such-file.toml", "--arm"), 2, "cannot be read"),
         (("look",), 2, "look"),
     ],

@@ -149,7 +149,7 @@ CYCLES: dict[str, tuple[list[tuple[float, str, str]], str, int]] = {
     "an error in between": ([(11, "Lost.", "ready"), (13, "", "ready")], "", 0),
     "in its fault": (
         [(11, "", "fault"), (13, "", "fault"), (13.1, "", "fault")],
-        "The drive stays in FAULT: its cause is not gone. Look at the machine.", 4,
+        "The drive stays in FAULT: its cause is not gone. Check the machine.", 4,
     ),
     "no answer": ([(11, "", "fault"), (13.1, "Lost.", "ready")], "Lost.", 3),
     "at the terminals": ([(13.1, "", "fault")], "Not in command.", 4),
@@ -294,7 +294,7 @@ async def test_drive_of_a_bundle_is_opened_by_its_expected_profile(
     async def connects(_: object, target: Target) -> Any:
         given.append(target)
         if target.profile_id is None:
-            raise click.UsageError("It does not say what it is.")
+            raise click.UsageError("It does not identify itself.")
         return "session"
 
     monkeypatch.setattr(bundle, "connect_drive", connects)
@@ -309,7 +309,7 @@ async def test_drive_of_a_bundle_is_opened_by_its_expected_profile(
         (4, None), (4, "atv71"), (5, None), (5, "link-5"),
     ]  # fmt: skip
     nameless = bundle._subject(Target("L", 1, None), (4,), opened, None)
-    with pytest.raises(Missing, match="It does not say what it is"):
+    with pytest.raises(Missing, match="It does not identify itself"):
         await nameless.open_drive(4)
     assert (named.text, named.link, named.opened, named.devices) == ("L", None, "opened", (4,))
 

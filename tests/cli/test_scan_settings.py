@@ -19,7 +19,7 @@ from tui.session.connect.open_line import OpenLine
 
 FIRST, SECOND = LineSetting(19200, "8E1"), LineSetting(9600, "8N1")
 LISTENING = "drivepanel: Listening for 0.01 s before the first request."
-HIT = "  3  {}   answers, but does not say what it is"
+HIT = "  3  {}   answers, but does not identify itself"
 ACTS = "Device 3: its timeout reaction is not known."
 HELD_BACK = (
     "No other setting is tried: polling of these drives would stop. Use --yes to try anyway."

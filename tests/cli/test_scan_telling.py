@@ -30,5 +30,6 @@ def test_progress_is_drawn_on_a_terminal_only(
 def test_progress_is_described_in_words() -> None:
     assert PROGRESS.text.startswith("19200")
     assert "12 of 31" in PROGRESS.text
-    assert "2 found, 1 more settings, 3 s left" in PROGRESS.text
+    assert "2 found, 1 more setting, 3 s left" in PROGRESS.text
     assert Progress(None, 1, 2, 0, 0.2).text.endswith("0 found, 1 s left")
+    assert Progress(None, 2, 2, 1, 0.2).text == "2 of 2 asked, 1 found"

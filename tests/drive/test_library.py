@@ -68,7 +68,7 @@ def test_small_profile_loads(tmp_path: Path) -> None:
     ("old", "new", "line", "words"),
     [
         ('unit = "Hz"', 'unit = "Hz"\ncolor = "red"', 29, "`color` is not a field"),
-        ("address = 100", 'address = "100"', 27, "must be of type int, not str"),
+        ("address = 100", 'address = "100"', 27, "must be a whole number, not a text"),
         ("address = 100", "address = 70000", 27, "must be <= 65535"),
         ('scale = "0.1"', 'scale = "0,1"', 29, "wrong form"),
         ('scale = "0.1"', 'scale = "0.0"', 29, "scale must not be 0"),

@@ -380,7 +380,7 @@ def test_reset_clears_a_fault_without_a_cause() -> None:
         drive.clear_cause()
         done = drivepanel("reset", line, "--arm")
         assert (done.returncode, besides(done.stderr)) == (0, "")
-        assert "\nFault reset: " in done.stdout
+        assert "\nFault reset. State: " in done.stdout
         assert drive.fault is None
 
 

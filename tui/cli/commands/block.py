@@ -114,7 +114,7 @@ def _check_usage(wanted: Wanted) -> None:
     if wanted.action in ("load", "save") and len(wanted.words) != 1:
         raise click.UsageError(f"{wanted.action} takes one FILE.")
     if wanted.action not in needs and wanted.words:
-        raise click.UsageError(f"{wanted.action} takes nothing behind it.")
+        raise click.UsageError(f"{wanted.action} takes no further words.")
 
 
 async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> int:

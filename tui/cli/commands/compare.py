@@ -145,7 +145,7 @@ def _set_of(text: str, target: Target) -> ParameterSet:
     if path == STANDARD or path.is_file() or (path.suffix == ".toml" and os.path.lexists(path)):
         return set_in(path)
     if path.suffix == ".toml":
-        raise Failure(f"{text} is not there.", USAGE)
+        raise Failure(f"{text} not found.", USAGE)
     return set_of_drive(target)[1]
 
 

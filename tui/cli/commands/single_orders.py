@@ -127,7 +127,7 @@ def reset(
         await _out_of_fault(console, outcome)
         name, _, came = outcome.text.partition(":")
         now = came.partition(";")[2]
-        return f"{name}: {latest_of(console).state.headline}{';' * bool(now)}{now}"
+        return f"{name}. State: {latest_of(console).state.headline}{';' * bool(now)}{now}"
 
     _ordered("reset", target, read_only, work, as_json=as_json)
 
@@ -157,6 +157,6 @@ async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
     if why := not_in_command(console.session.profile, console.session.image.raws):
         raise Failure(why, DRIVE_REFUSED)
     raise Failure(
-        f"The drive stays in {latest.state.headline}: its cause is not gone. Look at the machine.",
+        f"The drive stays in {latest.state.headline}: its cause is not gone. Check the machine.",
         DRIVE_REFUSED,
     )

@@ -202,7 +202,8 @@ def _say_findings(evidence: ProfileEvidence, *, err: bool) -> None:
             name = finding.name
             if finding.subject == "frame":
                 name = f"{name}, {finding.statement.partition(' ')[0]}"
-            say(f"{result:<12}  {finding.subject} {name}: {finding.seen}", indent=14, err=err)
+            subject = f"{finding.subject} {name}".rstrip()
+            say(f"{result:<12}  {subject}: {finding.seen}", indent=14, err=err)
         if len(found) > LISTED:
             say(f"{result:<12}  and {len(found) - LISTED} more in the file", err=err)
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from tui.drive.finding import LineSetting, WatchingFamily, watching_text
 from tui.drive.plain import plain
 from tui.drive.profile import library
-from tui.drive.sentences import any_of
+from tui.drive.sentences import any_of, counted
 from tui.session.connect.search import LEFT_ALONE
 
 from ..shared.rows import Column, say_row
@@ -58,15 +58,20 @@ class Progress:
     def text(self) -> str:
         """In one line."""
         text = _PROGRESS[self.setting is not None, bool(self.settings_left)]
-        return text.format(setting=self.setting, at=self, left=max(1, round(self.left)))
+        settings = counted(self.settings_left, "1 more setting", "{count} more settings")
+        if self.requested >= self.of and not self.settings_left:
+            text = text.removesuffix(_LEFT)
+        return text.format(
+            setting=self.setting, at=self, settings=settings, left=max(1, round(self.left))
+        )
 
 
+_LEFT = ", {left} s left"
 _PROGRESS = {
     (True, True): "{setting}: {at.requested} of {at.of} asked, {at.found} found,"
-    " {at.settings_left} more settings, {left} s left",
+    " {settings}, {left} s left",
     (True, False): "{setting}: {at.requested} of {at.of} asked, {at.found} found, {left} s left",
-    (False, True): "{at.requested} of {at.of} asked, {at.found} found,"
-    " {at.settings_left} more settings, {left} s left",
+    (False, True): "{at.requested} of {at.of} asked, {at.found} found, {settings}, {left} s left",
     (False, False): "{at.requested} of {at.of} asked, {at.found} found, {left} s left",
 }
 """By whether the settings of the line are known, and whether others follow."""
@@ -209,4 +214,4 @@ def hit_text(hit: Hit) -> str:
         return plain(f"likely {vendors}: {families}")
     if stated := " ".join(part for part in (who.vendor, who.reference, who.version_text) if part):
         return plain(f"{stated}: no profile fits")
-    return "answers, but does not say what it is"
+    return "answers, but does not identify itself"

@@ -94,7 +94,7 @@ async def first_stopped(wish: StopWish, device: int, before: StartRecord | None)
         identity = await identify_drive(opened.line, device, priority=Priority.STOP)
         says = f"it says it is {identity.reference}" if identity.reference else "it names nothing"
     except ExchangeError as error:
-        silent, says = error, "it does not say what it is"
+        silent, says = error, "it does not identify itself"
     wish.telling.sent_first(device, first.sent, says)
     if silent is not None and not first.answered:
         hint = [] if typed else ["-p sends a stop word blind."]

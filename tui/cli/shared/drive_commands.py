@@ -146,7 +146,7 @@ def need_arming(arm: bool, does: str) -> None:
     """Raise Failure without --arm; `does` is the effect of the command on the drive."""
     if not arm:
         raise Failure(
-            f"Not armed: {does}.\n--arm lets this one command write to this one drive. Look at the"
-            " machine first, then add it.",
+            f"Not armed: {does}.\n--arm lets this one command write to this one drive. Check the"
+            " machine, then repeat the command with --arm.",
             REFUSED_HERE,
         )

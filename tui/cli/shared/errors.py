@@ -84,7 +84,7 @@ def plain_errors(*, as_json: bool) -> Iterator[None]:
         try:
             yield
         except click.UsageError as error:
-            path = error.ctx.command_path if error.ctx is not None else "drivepanel"
+            path = error.ctx.command_path if error.ctx is not None else _command_path()
             command = path.removesuffix(" panel")
             text = f"{error.format_message()}\nTry '{command} --help'."
             raise Failure(text, USAGE) from error
@@ -101,6 +101,14 @@ def plain_errors(*, as_json: bool) -> Iterator[None]:
                 )
                 print_json(document, compact=True)
         raise
+
+
+def _command_path() -> str:
+    """Return the words that call the present command."""
+    from .output import command_name
+
+    name = command_name()
+    return f"drivepanel {name}" if name else "drivepanel"
 
 
 def status_of(error: Exception) -> int | None:

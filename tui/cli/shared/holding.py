@@ -31,7 +31,7 @@ Tell = Callable[["HoldEvent", int, str], None]
 
 HOLD_POLL_INTERVAL = 0.2
 _IN_FAULT = "Device {device} is in fault: {fault}."
-_NO_FAULT = "Device {device} is in fault no more."
+_NO_FAULT = "Device {device} is no longer in fault."
 
 
 @dataclass(slots=True)

@@ -74,7 +74,7 @@ def _way_to_profile(reported: str | None, *, by_recipe: bool) -> str:
     source = None if context is None else context.get_parameter_source("profile_id")
     if source is click.core.ParameterSource.DEFAULT_MAP:  # the name of the line has it
         return f"Name -p {reported}, or correct the settings file."
-    return f"Name -p {reported}, or leave -p away."
+    return f"Name -p {reported}, or omit -p."
 
 
 def believe_the_person(session: DriveSession, *, forced: bool, by_recipe: bool) -> None:

@@ -24,27 +24,20 @@ def wait_for_state(line: ModbusLine) -> None:
         time.sleep(STATE_COMES_WITHIN)
 
 
-def is_slow(line: ModbusLine, device: int) -> bool:
-    """True if late replies of a drive came that did not answer in time."""
+LATE_ON_LINE = (
+    "A late reply came on this line; it may be of this drive. If so, add ,timeout=SECONDS to LINE,"
+    " for example ,timeout=2; the longest is 30 s."
+)
+
+
+def has_late_replies(line: ModbusLine) -> bool:
+    """True if late replies came over Modbus TCP, where they are counted for the line alone."""
     from tui.bus.link import TcpLink
 
-    # over Modbus TCP late replies are counted for the line alone
-    late = isinstance(line.link, TcpLink) and line.counters.stale > 0
-    return late or line.device_state(device).lateness > 0
+    return isinstance(line.link, TcpLink) and line.counters.stale > 0
 
 
-_AS_TYPED = (
-    "Are address, wiring, {link.baud} baud and {link.format} (as typed) those of the drive?"
-    " Others: serial:{link.path},BAUD,FORMAT."
-)
-_OF_PROFILE = (
-    "Are address, wiring, {link.baud} baud and {link.format} (the profile's own) those of the"
-    " drive? Others: serial:{link.path},BAUD,FORMAT."
-)
-_DEFAULTS = (
-    "Are address, wiring, {link.baud} baud and {link.format} (as no others are named) those of the"
-    " drive? Others: serial:{link.path},BAUD,FORMAT."
-)
+_SETTINGS = "Are address, wiring, {settings} those of the drive? Others: serial:{path},BAUD,FORMAT."
 
 
 def about_silence(opened: OpenLine, text: str, device: int, *, by_profile: bool) -> str:
@@ -52,15 +45,22 @@ def about_silence(opened: OpenLine, text: str, device: int, *, by_profile: bool)
     from tui.bus.link import SerialLink, UsualSettings, parse_link
 
     link = opened.line.link
-    if is_slow(opened.line, device):
+    if opened.line.device_state(device).lateness > 0:
         return ANSWERS_LATE
+    if has_late_replies(opened.line):
+        return LATE_ON_LINE
     if not isinstance(link, SerialLink) or opened.simulation is not None:
         return ""
     other = UsualSettings(link.baud + 1, "8N1" if link.format != "8N1" else "8E1")
     plain = parse_link(text, other)
-    named = isinstance(plain, SerialLink) and (plain.baud, plain.format) == (link.baud, link.format)
-    text = _AS_TYPED if named else _OF_PROFILE if by_profile else _DEFAULTS
-    return text.format(link=link)
+    usual = "the profile's own" if by_profile else "the default"
+    typed = (plain.baud, plain.format) if isinstance(plain, SerialLink) else (0, "")
+    baud = "as typed" if typed[0] == link.baud else usual
+    format_ = "as typed" if typed[1] == link.format else usual
+    settings = f"{link.baud} baud ({baud}) and {link.format} ({format_})"
+    if baud == format_:
+        settings = f"{link.baud} baud and {link.format} ({baud})"
+    return _SETTINGS.format(settings=settings, path=link.path)
 
 
 def silence_hint(error: Exception, opened: OpenLine, text: str, *, by_profile: bool) -> str:

@@ -115,7 +115,7 @@ def _entries(count: int) -> str:
 
 
 def _scalar_fault(shape: shapes.Type, value: Any) -> str:
-    reported = type(value).__name__
+    reported = _kind_of(value)
     match shape:
         case shapes.BoolType():
             return "" if isinstance(value, bool) else f"must be true or false, not {reported}"
@@ -123,7 +123,7 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
             return _number_fault(shape, value)
         case shapes.StrType(pattern=pattern):
             if not isinstance(value, str):
-                return f"must be of type str (a text in quotes), not {reported}"
+                return f"must be a text in quotes, not {reported}"
             if pattern and not re.search(pattern, value):
                 form = TEXT_FORMS.get(pattern, pattern)
                 return f"{value!r} has the wrong form; use {form}"
@@ -131,17 +131,29 @@ def _scalar_fault(shape: shapes.Type, value: Any) -> str:
             if value not in values or isinstance(value, bool):
                 named = [text for text in values if text != ""]
                 return _instead(f"{value!r} is not an allowed value", value, named)
+        case shapes.ListType():
+            single = reported.replace("a ", "a single ", 1)
+            return f"must be {_kind(shape)}, not {single}"
         case _:
             return f"must be {_kind(shape)}, not {reported}"
     return ""
+
+
+def _kind_of(value: Any) -> str:
+    """Return the kind of a value in a TOML file, in words."""
+    kinds = {
+        bool: "true or false", int: "a number", float: "a number with a point", str: "a text",
+        dict: "a table", list: "a list",
+    }  # fmt: skip
+    return kinds.get(type(value), "a date or time")
 
 
 def _number_fault(shape: shapes.IntType | shapes.FloatType, value: Any) -> str:
     low, high = shape.ge, shape.le
     kinds = (int,) if isinstance(shape, shapes.IntType) else (int, float)
     if isinstance(value, bool) or not isinstance(value, kinds):
-        wanted = "of type int" if len(kinds) == 1 else "a number"
-        return _within(f"must be {wanted}, not {type(value).__name__}", low, high)
+        wanted = "a whole number" if len(kinds) == 1 else "a number"
+        return _within(f"must be {wanted}, not {_kind_of(value)}", low, high)
     if not math.isfinite(value):
         return _within(f"must be a finite number, not {value}", low, high)
     if low is not None and value < low:
@@ -181,7 +193,8 @@ def _kind(shape: shapes.Type) -> str:
         case shapes.ListType():
             return f"a list whose entries are each {_kind(shape.item_type)}"
         case shapes.LiteralType(values=values):
-            return f"one of {', '.join(map(str, values[:LISTED_SINGLY]))}"
+            listed = ", ".join(map(str, values[:LISTED_SINGLY]))
+            return f"the value {listed}" if len(values) == 1 else f"one of {listed}"
         case shapes.IntType(ge=low, le=high) | shapes.FloatType(ge=low, le=high):
             no_limit = low is None and high is None
             return "a number" if no_limit else f"a number from {low} to {high}"

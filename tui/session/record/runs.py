@@ -147,7 +147,8 @@ def read_events(files: Sequence[Path]) -> RecordEvents:
                 found.line = reader.line
             found.files.append(path)
         except (OSError, sqlite3.Error) as error:
-            found.unread.append(f"{path}: {error}")
+            text = str(error)
+            found.unread.append(text if text.startswith(str(path)) else f"{path}: {text}")
     return found
 
 
