@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 
 RECIPES_WRITTEN = "{file}: recipes of {count} drives."
-SHARED = "{file}: {count} drives of {name} share {shared} settings."
+SETTINGS_SHARED = "{file}: {count} drives of {name} share {shared} settings."
 RecipeDrive = tuple["DriveSession", "ParameterSet"]
 
 
@@ -68,7 +68,7 @@ def back_up_recipes(target: Target, file: Path, *, force: bool, as_json: bool) -
         machine, rest = split_sets(profile, members)
         if len(members) > 1:
             shared_texts.append(
-                SHARED.format(
+                SETTINGS_SHARED.format(
                     file=_machine_file(file, id_),
                     count=len(members),
                     name=profile.name,

@@ -52,7 +52,7 @@ if TYPE_CHECKING:
     from ..documents.parts import EditField, OutcomeText
 
 
-HELD_BACK = "{code} depends on {base}, which would not be written."
+WOULD_BE_HELD_BACK = "{code} depends on {base}, which would not be written."
 
 
 class _Written(TypedDict):
@@ -217,7 +217,7 @@ async def _past_limits(
     while True:
         missed = {*past, *held_back}
         more = {
-            edit.code: HELD_BACK.format(code=edit.code, base=base)
+            edit.code: WOULD_BE_HELD_BACK.format(code=edit.code, base=base)
             for edit in edits
             if edit.code not in missed and (base := builds_on(profile, edit, missed, edits, raws))
         }

@@ -60,13 +60,12 @@ class Progress:
         text = _PROGRESS[self.setting is not None, bool(self.settings_left)]
         settings = counted(self.settings_left, "1 more setting", "{count} more settings")
         if self.requested >= self.of and not self.settings_left:
-            text = text.removesuffix(_LEFT)
+            text = _LAST_PROGRESS[self.setting is not None]
         return text.format(
             setting=self.setting, at=self, settings=settings, left=max(1, round(self.left))
         )
 
 
-_LEFT = ", {left} s left"
 _PROGRESS = {
     (True, True): "{setting}: {at.requested} of {at.of} asked, {at.found} found,"
     " {settings}, {left} s left",
@@ -75,6 +74,11 @@ _PROGRESS = {
     (False, False): "{at.requested} of {at.of} asked, {at.found} found, {left} s left",
 }
 """By whether the settings of the line are known, and whether others follow."""
+_LAST_PROGRESS = (
+    "{at.requested} of {at.of} asked, {at.found} found",
+    "{setting}: {at.requested} of {at.of} asked, {at.found} found",
+)
+"""By whether the settings of the line are known."""
 _TAKEN = "The address is taken."
 _TAKEN_TWICE = "The address is taken, perhaps twice."
 

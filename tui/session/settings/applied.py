@@ -89,7 +89,8 @@ def done_text(done: Iterable[Result], *, seen: bool = True) -> str:
     unchanged = sum(result.unchanged for result in results)
     sent = sum(result.outcome is EditOutcome.SENT for result in results)
     written = len(results) - sent - unchanged
-    parts = [f"Wrote {written}{', all verified' if seen else ''}."] if written else []
+    wrote = f"Wrote {written}, all verified." if seen else f"Wrote {written}."
+    parts = [wrote] if written else []
     parts += [f"Sent {sent}, not verified."] if sent else []
     parts += [f"Already held: {unchanged}."] if unchanged else []
     return " ".join(parts)
