@@ -159,6 +159,7 @@ def test_frequency_without_a_sign_gets_that_of_the_direction(
     words = SimpleNamespace(type=kind)
     state = SimpleNamespace(direction=direction)
     assert with_direction(cast(Any, words), 30.0, cast(Any, state)) == number
+    assert str(with_direction(cast(Any, words), 0.0, cast(Any, state))) == "0.0"
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from tests.sweeps import kept
 from tui.drive.blocks.picking import choices, raw_of
 from tui.drive.control_source import source_changes
 from tui.drive.profile import library
-from tui.drive.profile.profile import Profile
+from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.settings.edits import Edit, Edits
 from tui.drive.settings.selection import Choice, FilterId, chosen_codes, group_order, rows
 from tui.screens.blocks.view import table_lines
@@ -37,7 +37,8 @@ from tui.screens.faults.parts import LABEL
 from tui.screens.faults.view import stored_lines
 from tui.screens.keys.finding import find
 from tui.screens.keys.table import SCREENS
-from tui.screens.monitor.assembly import other_values, value_labels
+from tui.screens.monitor.arrange import VALUE_COLUMN
+from tui.screens.monitor.assembly import LABELS, other_values, value_labels
 from tui.screens.parameters.parameter_list import FIRST, LAST, ParameterList, group_lines
 from tui.screens.parameters.screen import NARROW, WIDE
 from tui.screens.parameters.table_view import (
@@ -314,3 +315,15 @@ def test_values_of_monitor(family: str) -> None:
                 labels = value_labels(profile, values, cells, barred)
                 assert alike(labels) == [], cells
                 assert len({len(label) for label in labels}) <= 1
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_values_of_monitor_in_narrow_columns_have_whole_names(family: str) -> None:
+    profile = library.load(family)
+    known = [
+        value
+        for value in other_values(profile, wide=False)
+        if profile[value.parameter].quantity in LABELS and is_verified(profile[value.parameter])
+    ]
+    labels = value_labels(profile, known, VALUE_COLUMN, barred=False)
+    assert not [label for label in labels if "…" in label]

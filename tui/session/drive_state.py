@@ -117,8 +117,8 @@ def with_direction(parameter: Parameter, number: Signed, state: DriveState) -> S
 
     Some drives report it without a sign, and the direction in the status word.
     """
-    signed = is_signed_type(parameter)
-    return -number if not signed and state.direction == "reverse" else number
+    reverse = state.direction == "reverse" and not is_signed_type(parameter)
+    return -number if reverse and number else number  # 0.0 has no sign
 
 
 def channel_text(parameter: Parameter, value: Value) -> str:

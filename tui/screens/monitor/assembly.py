@@ -60,17 +60,17 @@ LABELS: dict[Quantity, str] = {
 }
 SHORT_LABELS: dict[Quantity, str] = {
     "ramp_output": "Ramped",
-    "motor_voltage": "Motor",
+    "motor_voltage": "Motor V",
     "mains_voltage": "Mains",
     "input_power": "Input",
-    "drive_thermal": "Drive th",
-    "motor_thermal": "Motor th",
+    "drive_thermal": "Drv th",
+    "motor_thermal": "Mot th",
     "motor_load": "Load",
-    "drive_load": "Drive ld",
-    "run_hours": "Run time",
+    "drive_load": "Drv ld",
+    "run_hours": "Runtime",
     "power_on_hours": "On time",
 }
-"""Labels for narrow columns."""
+"""Labels for narrow columns, of 7 cells at most: names in the middle of which nothing is cut."""
 IN_READOUTS: frozenset[Quantity] = frozenset(
     {"output_frequency", "frequency_reference", "motor_current"}
 )

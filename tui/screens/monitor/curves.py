@@ -172,7 +172,7 @@ def _present(view: View, band: Band) -> tuple[float, str] | None:
     if number is None:
         return None
     digits = possible_decimals(band.parameter)
-    return number, f"{number:.{digits}f}"
+    return number, f"{number:z.{digits}f}"
 
 
 def _scale(view: View, band: Band, curves: Sequence[Curve], rows: int) -> CurveScale:
@@ -259,7 +259,7 @@ def _read_out(view: View, moment: float, width: int) -> Text:
         if value is None:
             text.append(f"{NOT_AVAILABLE:>{cells}}", FAINT)
         else:
-            text.append(f"{value:>{cells}.{possible_decimals(parameter)}f}", STRONG)
+            text.append(f"{value:>z{cells}.{possible_decimals(parameter)}f}", STRONG)
         text.append(f" {parameter.unit or 'raw'}", FAINT)
     at = found[0] if found is not None else moment
     head = Text(f" {clock_text(at + view.apart)}", PLAIN if found is not None else STALE)

@@ -316,7 +316,7 @@ def _side(view: View, quantity: Quantity, parameter: Parameter | None) -> list[T
     seen = [value for point in page if (value := point.values[place]) is not None]
     highest, lowest = max(seen), min(seen)
     covered = "" if view.lean else f"{page[-1].time - page[0].time:.0f} s"
-    texts = [f"{round(number, digits) + 0.0:.{digits}f}" for number in (highest, lowest)]  # no -0.0
+    texts = [f"{number:z.{digits}f}" for number in (highest, lowest)]
     # a long number keeps its distance from its name, not from the frame
     cells = SIDE_CELLS - 3
     gap = " " if max(map(len, texts)) < cells - 1 else ""

@@ -142,7 +142,7 @@ class TrendScreen(BandKeys):
             name=name,
             unit=trace.unit,
             digits=digits,
-            now="" if number is None else f"{number:.{digits}f}",
+            now="" if number is None else f"{number:z.{digits}f}",
             at_cursor=page.cursor is not None,
             at_mark=page.mark_a is not None,
             cursor=None if page.cursor is None else value_at(points, page.cursor, reach),

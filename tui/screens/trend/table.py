@@ -104,7 +104,7 @@ def _cells(row: TableRow) -> dict[str, str]:
         strict=True,
     ):
         shown = "" if marks is None else NOT_AVAILABLE
-        found[name] = shown if value is None else f"{value:.{row.digits}f}"
+        found[name] = shown if value is None else f"{value:z.{row.digits}f}"
     return found
 
 
@@ -118,4 +118,4 @@ def point_text(point: HistoryPoint | None, row: TableRow) -> str:
     """Return a value as text; a mean of several replies with a sign."""
     if point is None or point.mean is None:
         return NOT_AVAILABLE
-    return f"{REDUCED_SIGN if point.reduced else ''}{point.mean:.{row.digits}f}"
+    return f"{REDUCED_SIGN if point.reduced else ''}{point.mean:z.{row.digits}f}"

@@ -256,7 +256,7 @@ def _present(view: TrendView, band: BandView) -> tuple[float, Text] | None:
     room = LATEST_CELLS - 1
 
     def current(held: Value) -> Text | None:
-        shown = f"{number:.{band.digits}f}" if number is not None else held.text
+        shown = f"{number:z.{band.digits}f}" if number is not None else held.text
         return Text(short(shown, room), STRONG)
 
     def old(_: Value, age: float) -> Text | None:
