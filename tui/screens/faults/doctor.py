@@ -137,9 +137,12 @@ def _unweighed(view: DoctorView, width: int) -> list[list[Text]]:
     """Return the cause that the profile names, if there is no help on the fault."""
     if view.is_quiet:
         return []
-    cause = view.fault.cause if view.fault else ""
-    cause = cause or view.profile.guide.trouble or "The available manual gives no cause."
-    rows = [Text(f"    {part}", PLAIN) for part in wrapped(cause, width - SIGN_WIDTH - 1, 3)]
+    if view.fault is None and view.profile.data.faults.codes:
+        text = "Its code was not read, so its causes are unknown."
+    else:
+        cause = view.fault.cause if view.fault else ""
+        text = cause or view.profile.guide.trouble or "The available manual gives no cause."
+    rows = [Text(f"    {part}", PLAIN) for part in wrapped(text, width - SIGN_WIDTH - 1, 3)]
     return [[rule("Why", width)], rows]
 
 
@@ -306,16 +309,18 @@ def _headline(view: DoctorView, width: int) -> Text:
 
 def _when_text(view: DoctorView) -> str:
     """Return the time of the trip or of the first read, and how long ago it was."""
-    record, wall = view.record, None
+    record = view.record
     if view.since is not None:
-        when, wall = view.since.when, view.since.wall
+        when, ago = view.since.when, ago_text(view.wall - view.since.wall)
         if record is None and not view.since.tripped:
-            when = f"{when}, tripped earlier"
+            when = f"{when} ({ago}); tripped before that"  # that is not the time of the trip
+        else:
+            when = f"{when}, {ago}"
     elif record is not None:
-        when, wall = f"tripped {time.strftime(TIME, time.localtime(record.wall))}", record.wall
+        tripped = time.strftime(TIME, time.localtime(record.wall))
+        when = f"tripped {tripped}, {ago_text(view.wall - record.wall)}"
     elif view.present:
         return "tripped before monitoring began"
     else:
         return "no longer present"
-    ago = ago_text(view.wall - wall)
-    return f"{when}, {ago}" if view.present else f"{when}, {ago}, no longer present"
+    return when if view.present else f"{when}, no longer present"

@@ -137,6 +137,8 @@ def _write(entry: Entry, after: float, width: int) -> Text:
 STORED_MARK = " stored"
 STORED_WIDTH = len(STORED_MARK) + 28
 """Columns of the values that the drive stored; the mark separates them from values read now."""
+LEAST_FAULT_NAME = 8
+"""Cells below which a shortened name would not name its fault."""
 STORED_UNITS = ("Hz", "A", "h")
 """Units of the values shown for a fault of the history, if the drive stores them."""
 
@@ -155,15 +157,13 @@ def history_rows(view: DoctorView, width: int, height: int) -> list[Text]:
     if not view.history:
         return labelled("History", [Text("not known on this drive", FAINT)])
     reported = view.history[: max(shown_count(view), 1)]
-    texts = [_past_text(view, code) for code in reported]
     stored = [_past_stored(view, number, code) for number, code in enumerate(reported)]
-    kept = STORED_WIDTH if any(stored) else 0
-    room = max(8, width - LABEL - 5 - kept)
-    names = fitted_names(tuple(texts), room)
-    rows = [
-        _past(view, number, f"{names[text]:<{room}}", f"{values:<{kept}}", width)
-        for number, (text, values) in enumerate(zip(texts, stored, strict=True))
-    ]
+    room = max(8, width - LABEL - 5)
+    rows = []
+    for number, (code, values) in enumerate(zip(reported, stored, strict=True)):
+        cells = max(8, room - STORED_WIDTH) if values else room
+        name = f"{_past_text(view, code, cells):<{cells}}"
+        rows.append(_past(view, number, name, f"{values:<{STORED_WIDTH if values else 0}}", width))
     chosen = view.at - len(view.rows)
     top = max(0, min(chosen - height + 1, len(rows) - height)) if chosen >= 0 else 0
     return labelled("History", rows[top : top + height])
@@ -175,12 +175,18 @@ def _past_fault(view: DoctorView, code: str) -> int | None:
     return None if reading is None else reading.raw
 
 
-def _past_text(view: DoctorView, code: str) -> str:
+def _past_text(view: DoctorView, code: str, cells: int) -> str:
+    """Return a past fault's code and as much of its name as fits; the code is never cut."""
     raw = _past_fault(view, code)
     if raw is None:
         return NOT_AVAILABLE
     known = view.profile.fault(raw)
-    return f"{known.code} {known.name}" if known else f"code {raw}"
+    if known is None:
+        return f"code {raw}"
+    left = cells - len(known.code) - 1
+    if left < min(len(known.name), LEAST_FAULT_NAME):
+        return known.code
+    return f"{known.code} {fitted_names((known.name,), left)[known.name]}"
 
 
 def _past_stored(view: DoctorView, number: int, code: str) -> str:
