@@ -98,6 +98,18 @@ def test_spare_cells_go_to_long_names_before_the_message(width: int, two_rows: b
         assert name[-2:] in wall_line(WallRow(1, name), columns).plain.split("\n")[0]
 
 
+@pytest.mark.parametrize("width", [36, 41, 45, 58, 79])
+def test_narrow_row_shows_the_whole_fault_code_and_minutes(width: int) -> None:
+    row = WallRow(
+        1, "PUMP", kind="fault", words="FAULT OPF1", message=("OPF1", ""), brief="12 min",
+        message_kind="fault",
+    )  # fmt: skip
+    text = wall_line(row, columns_for(width)).plain
+    assert "OPF1" in text
+    assert "…" not in text
+    assert "12 min" in text or "12min" in text
+
+
 def test_two_rows_are_used_only_if_they_fit() -> None:
     assert [columns_for(width, two_rows=True).rows for width in (119, 79, 60)] == [2, 2, 1]
 

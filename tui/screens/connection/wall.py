@@ -109,7 +109,7 @@ SINGLE_ROWS = (
     WallColumns(12, 0, 13, 0, 18, 24),
     WallColumns(12, 0, 13, 0, 12, 19),
     WallColumns(10, 0, 12, 0, 12, 6),
-    WallColumns(11, 0, 11, 0, 6, 6),
+    WallColumns(11, 0, 12, 0, 6, 6),
     WallColumns(9, 0, 12, 0, 0, 8),
     WallColumns(8, 0, 11, 0, 0, 6),
     WallColumns(0, 0, 10, 0, 0, 5),
@@ -228,7 +228,10 @@ def _first_row(row: WallRow, columns: WallColumns) -> Text:
     if columns.model:
         text.append(f" {fitted_name(row.model, columns.model):<{columns.model}}", FAINT)
     text.append(" ")
-    state = f"{WALL_SIGNS.get(row.kind, '□')} {short(row.words, columns.state - 2)}"
+    words, room = row.words, columns.state - 2
+    if row.kind == "fault" and len(words) > room:
+        words = words.removeprefix("FAULT ")  # the sign and the color remain
+    state = f"{WALL_SIGNS.get(row.kind, '□')} {short(words, room)}"
     block = row.kind in ("fault", "stop failed")
     message = f"{state:<{columns.state}}" if block else state
     text.append(message, STATE_STYLE.get(row.kind, PLAIN))
@@ -253,7 +256,8 @@ def _message(row: WallRow, columns: WallColumns) -> str:
     """Return the message of the first row, or all of it if there is only one row."""
     first, rest = row.message
     if columns.message < LEAST_MESSAGE:
-        return row.brief
+        fits = len(row.brief) <= columns.message
+        return row.brief if fits else row.brief.replace(" ", "")  # "12min"
     if columns.rows == 2:
         return first
     if row.message_kind == "fault":
@@ -316,10 +320,13 @@ def load_bar(share: float | None, width: int) -> Text:
 
 
 def spaced_age(age: float | None) -> str:
-    """Format an age in whole seconds, minutes (m), hours (h) or days (d), in five cells at most."""
+    """Format an age in whole seconds, minutes or days, or in hours, in six cells at most."""
     if age is None:
         return ""
-    for seconds, unit in ((1, "s"), (60, "m"), (3600, "h")):
+    for seconds, unit in ((1, "s"), (60, "min")):
         if age < 100 * seconds:
             return f"{math.floor(age / seconds)} {unit}"
-    return f"{math.floor(min(age / 86400, 999))} d"
+    hours = age / 3600
+    if hours < 100:
+        return f"{math.floor(10 * hours) / 10:.1f} h" if hours < 10 else f"{math.floor(hours)} h"
+    return f"{math.floor(min(hours / 24, 999))} d"
