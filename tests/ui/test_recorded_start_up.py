@@ -57,6 +57,7 @@ def startups() -> Iterator[tuple[str, StartUp, StartUpView]]:
                     start_up, profile, aged if turn == 3 else readings, known if turn else {},
                     {"ACC": "5.0 s"} if turn % 2 else {}, fakes.NOW + (30 if turn == 3 else 0),
                     "ATV71HU15M3" if turn < 2 else "", lambda row, entry: entry == "7",
+                    "2026-11-21" if number % 5 else "2026-11-22",
                 )  # fmt: skip
                 yield f"{family} {number} {state}", start_up, view
 

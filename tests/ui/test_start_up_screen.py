@@ -248,7 +248,7 @@ def test_step_is_whole_on_every_screen(size: tuple[int, int]) -> None:
         opened = open_start_up(DriveSession(FakeLine(), 1, profile), f"{family}-{size}", None)
         for _ in opened.guide.steps:
             step = opened.step
-            view = StartUpView(opened, profile, {}, {}, {}, 0.0, "", lambda *_: False)
+            view = StartUpView(opened, profile, {}, {}, {}, 0.0, "", lambda *_: False, "")
             lines = [line.plain for line in walk_lines(view, size[0], size[1] - 5)]
             assert len(lines) == size[1] - 5
             assert max(map(len, lines)) <= size[0]
@@ -266,7 +266,7 @@ def test_only_what_stands_out_is_bold() -> None:
     opened = open_start_up(DriveSession(FakeLine(), 1, library.load("atv71")), "bold", None)
     while not any(row.kind == "parameter" for row in opened.rows):
         opened.go(1)
-    view = StartUpView(opened, library.load("atv71"), {}, {}, {}, 0.0, "", lambda *_: False)
+    view = StartUpView(opened, library.load("atv71"), {}, {}, {}, 0.0, "", lambda *_: False, "")
     lines = walk_lines(view, 120, 40)
     assert not any(line.style for line in lines)
     bold = [

@@ -7,6 +7,7 @@ Monitor, each armed and confirmed there.
 from __future__ import annotations
 
 import asyncio
+import time
 from pathlib import Path
 from typing import ClassVar
 
@@ -143,6 +144,7 @@ class StartUpScreen(RowKeys):
             now,
             plain(facts.identity),
             differs,
+            time.strftime("%Y-%m-%d", time.localtime(self.app.clock.wall_of(now))),
         )
 
     def draw(self, width: int) -> None:

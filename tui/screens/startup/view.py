@@ -14,7 +14,14 @@ from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import is_setting
 from tui.drive.values import Value, is_enumeration
 from tui.session.shown import Shown
-from tui.session.startup.judging import TURNED, StepRow, changed_codes
+from tui.session.startup.judging import (
+    AS_REQUIRED,
+    NOT_AT_ALL,
+    OTHER_WAY,
+    TURNED,
+    StepRow,
+    changed_codes,
+)
 from tui.session.startup.start_up import StartUp
 from tui.session.startup.steps import KIND_ACCESS, GuideStep
 from tui.widgets.drawing import cut, cut_at_word, fitted_names, rule, wrapped
@@ -60,6 +67,19 @@ RESULT_LABELS = {
     "deficient": "Deficiency ...",
     "skip": "Skip with a reason ...",
 }
+TURNED_LABELS = {
+    AS_REQUIRED: "The motor turned as required",
+    OTHER_WAY: "The motor turned the other way",
+    NOT_AT_ALL: "The motor did not turn",
+}
+STOP_LABELS = {
+    "stop": "Normal stop",
+    "quick-stop": "Quick stop",
+    "freewheel": "Coast stop",
+    "emergency-stop": "Emergency stop",
+    "dc-braking": "DC braking",
+}
+"""Names of the methods, by their command."""
 ROWS_WITHOUT_LABEL = {*RESULT_LABELS, "turned", "parameter"}
 """Kinds of rows that have no label before a value."""
 ACTION_LABELS = {
@@ -86,6 +106,8 @@ class StartUpView(NamedTuple):
     """Reference and model that the drive reports."""
     differs: Callable[[StepRow, str], bool]
     """Returns True if an entry of a nameplate differs from the drive."""
+    today: str
+    """Local date, as in the times of the results."""
 
 
 def title_line(view: StartUpView, width: int) -> Text:
@@ -207,7 +229,8 @@ def state_text(view: StartUpView) -> str:
     """Return the state of the present step in words."""
     start_up = view.start_up
     record = start_up.record
-    when = f" {record.time[11:16]}" if record.time else ""
+    day = "" if record.time.startswith(view.today) else f" {record.time[:10]}"
+    when = f"{day} {record.time[11:16]}" if record.time else ""
     changed = ", ".join(_changed(view, start_up.step))
     texts = {
         "done": f"done{when}; since then changed: {changed}" if changed else f"done{when}",
@@ -255,7 +278,7 @@ def _row(view: StartUpView, row: StepRow, width: int, chosen: bool) -> Text:
         text.append(RESULT_LABELS[row.kind], PLAIN)
     elif row.kind == "turned":
         mark = "●" if record.entries.get(TURNED) == row.key else "○"
-        text.append(f"{mark} The motor turned: {row.key}", PLAIN)
+        text.append(f"{mark} {TURNED_LABELS.get(row.key, plain(row.key))}", PLAIN)
     elif row.kind == "parameter":
         text.append_text(_parameter(view, row.key, width))
     else:
@@ -290,7 +313,7 @@ def _label(view: StartUpView, row: StepRow) -> str:
     if row.kind == "speed":
         return f"At {row.key}"
     if row.kind == "stop":
-        return f"Stopped by {row.key}"
+        return STOP_LABELS.get(row.key, plain(row.key))
     return plain(ACTION_LABELS.get(row.kind, row.key))
 
 
