@@ -43,8 +43,8 @@ def reported(*frames: tuple[str, str], tcp: bool = False) -> list[str]:
         ([(">", "02 06 2329 0032"), ("<", "02 06 2329 0032")][1:], ["2 wrote ACC 5.0 s"]),
         ([(">", "02 10 2329 0002 04 0032 001E")], ["2 write ACC ← 5.0 s · DEC ← 3.0 s"]),
         ([(">", "02 03 0C81 0001"), ("<", "02 83 02")][1:], ["2 refuses read: exception 2"]),
-        ([("<", "02 03 02 0637")], ["2 1 words"]),
-        ([(">", "05 03 0C81 0002")], ["5 read 3201 (16#0c81), 2 words"]),
+        ([("<", "02 03 02 0637")], ["2 1 word"]),
+        ([(">", "05 03 0C81 0002")], ["5 read 3201 (16#0C81), 2 words"]),
         ([(">", "00 06 2135 0000")], ["all write 8501 ← 16#0000"]),
         ([(">", "02 2B 0E 01 00")], ["2 identify"]),
     ],
@@ -64,7 +64,7 @@ def test_value_that_a_simulated_drive_guesses_is_marked_in_its_reply() -> None:
 
 
 def test_reply_of_another_drive_is_not_decoded_by_the_last_request() -> None:
-    assert reported((">", "02 03 0C81 0001"), ("<", "03 03 02 0637"))[1] == "3 1 words"
+    assert reported((">", "02 03 0C81 0001"), ("<", "03 03 02 0637"))[1] == "3 1 word"
 
 
 def test_modbus_tcp_header_precedes_the_device() -> None:

@@ -19,7 +19,15 @@ from tui.session.listening.words import FUNCTION_NAMES
 from tui.wire.frames import BIT_READS, COIL_ON, SPACES, Pdu, bits_of, pdu_of
 from tui.wire.observed.pairing import BROADCAST_DEVICE
 
-READ_COILS, READ, WRITE_COIL, WRITE_ONE, WRITE_COILS, WRITE_MANY = 1, 3, 5, 6, 15, 16
+READ_COILS, READ_INPUTS, READ, WRITE_COIL, WRITE_ONE, WRITE_COILS, WRITE_MANY = (
+    1,
+    2,
+    3,
+    5,
+    6,
+    15,
+    16,
+)
 READ_WRITE = 23
 EXCEPTION_BIT = 0x80
 CODES_OF_FRAME = 3
@@ -129,14 +137,24 @@ def _reply(pdu: Pdu, requested: DecodedRequest | None, words: _Words) -> str:
         else:
             raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
         if requested is None or not known:
-            return f"{pdu.device} {len(raws)} {'bits' if pdu.function in BIT_READS else 'words'}"
-        return f"{pdu.device} {words.values(requested.address, raws)}"
+            if pdu.function in BIT_READS:
+                return f"{pdu.device} {counted(len(raws), '1 bit', '{count} bits')}"
+            return f"{pdu.device} {counted(len(raws), '1 word', '{count} words')}"
+        return (
+            f"{pdu.device} {_kind_of_bits(pdu, len(raws))}{words.values(requested.address, raws)}"
+        )
     if pdu.function in (WRITE_COIL, WRITE_ONE):
-        return f"{pdu.device} wrote {words.values(*_one(pdu))}"
+        return f"{pdu.device} wrote {_kind_of_bits(pdu)}{words.values(*_one(pdu))}"
     if pdu.function in (WRITE_COILS, WRITE_MANY):
         address, count = struct.unpack_from(">HH", pdu.body)
         return f"{pdu.device} wrote {words.names(address, count)}"
     return f"{pdu.device} {FUNCTION_NAMES.get(pdu.function, f'function {pdu.function}')}"
+
+
+def _kind_of_bits(pdu: Pdu, count: int = 1) -> str:
+    """Return what a frame names by address only, with a blank; empty for registers."""
+    name = {WRITE_COIL: "coil", READ_COILS: "coil", READ_INPUTS: "input"}.get(pdu.function, "")
+    return name and counted(count, f"{name} ", f"{name}s ")
 
 
 def _one(pdu: Pdu) -> tuple[int, list[int]]:
@@ -159,20 +177,23 @@ class _Words:
         found = [code for code, _, _ in self._cut(address, [0] * count)]
         named = [code for code in found if code]
         if not named:
-            single, several = "{at} (16#{at:04x}), 1 word", "{at} (16#{at:04x}), {count} words"
+            single, several = "{at} (16#{at:04X}), 1 word", "{at} (16#{at:04X}), {count} words"
             if self.function in BIT_READS:
-                single, several = "{at} (16#{at:04x}), 1 bit", "{at} (16#{at:04x}), {count} bits"
+                single, several = "{at} (16#{at:04X}), 1 bit", "{at} (16#{at:04X}), {count} bits"
             return counted(count, single, several, at=address)
         more = len(found) - CODES_OF_FRAME
         codes = " ".join(code or "?" for code in found[:CODES_OF_FRAME])
         return f"{codes} + {more} more" if more > 0 else codes
 
     def values(self, address: int, raws: Sequence[int], sign: str = "") -> str:
-        """Return the parameters with their values; `sign` precedes each value."""
+        """Return the parameters with their values; `sign` precedes each value.
+
+        Without one, = separates an address from its value.
+        """
         parts = []
         for code, text, where in self._cut(address, raws):
-            mark = GUESS if code in self.guesses else ""
-            parts.append(f"{code or where} {sign + ' ' if sign else ''}{text}{mark}")
+            mark, between = GUESS if code in self.guesses else "", sign or ("" if code else "=")
+            parts.append(" ".join(part for part in (code or where, between, text) if part) + mark)
         return " · ".join(parts)
 
     def _cut(self, address: int, raws: Sequence[int]) -> Iterable[tuple[str, str, str]]:
