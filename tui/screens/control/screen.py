@@ -18,6 +18,7 @@ from tui.drive.channel import switch_texts
 from tui.drive.chart import ENABLED_KINDS
 from tui.drive.control_source import SourceChange, source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
+from tui.drive.sentences import sentence, uncapitalized
 from tui.drive.signal_path import LineStep
 from tui.session.console import DriveConsole
 from tui.session.control_paths import ControlPaths
@@ -50,12 +51,11 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
 
 HOW_IT_IS_TESTED = (
-    "Polling pauses for longer and longer, up to about the timeout, until the drive reacts. It is"
-    " then in fault: press x on Monitor to reset it. The test takes about {seconds:.0f} s."
+    "Polling pauses for longer and longer, up to about the timeout, until the drive reacts."
 )
 WITH_RUNNING_MOTOR = (
     "THE MOTOR IS RUNNING. It reacts as set, and may coast; a hoist load falls. A stop is sent"
-    " when the test ends, or when you press a stop key. "
+    " when the test ends, or when you press a stop key."
 )
 PROPOSES = "Proposes the value on Parameters. Press w there to write it."
 FRAME_ROWS = 4
@@ -111,15 +111,19 @@ def ask_to_test(
     work: Callable[..., None],
 ) -> None:
     """Ask to start the test; `turning` warns of a running motor."""
-    seconds = TIMEOUTS_PER_TEST * watch.timeout if watch is not None else 0.0
-    how = (
-        HOW_IT_IS_TESTED.format(seconds=seconds)
-        if watch is not None
-        else HOW_IT_IS_TESTED.partition(" The test takes")[0]
-    )
+    reaction = watch.reaction if watch is not None else None
+    parts = [*([WITH_RUNNING_MOTOR] if turning else []), HOW_IT_IS_TESTED]
+    if reaction is not None:
+        does = uncapitalized(sentence(reaction.does))
+        parts.append(f"It should react with {reaction.name}: {does}")
+    if watch is None or watch.trips:
+        then = "is then" if reaction is not None else "may then be"
+        parts.append(f"It {then} in fault: press x on Monitor to reset it.")
+    if watch is not None:
+        parts.append(f"The test takes about {TIMEOUTS_PER_TEST * watch.timeout:.0f} s.")
     ask(
         f"Test how drive {session.device} reacts to a communication loss?",
-        (WITH_RUNNING_MOTOR if turning else "") + how,
+        " ".join(parts),
         "Test",
         "Cancel",
         partial(work, turning=turning),
@@ -300,7 +304,7 @@ class ControlSourceScreen(OrderKeys):
         if latest is not None and parameter is not None:
             reading = latest.readings.get(parameter.code)
             number = None if reading is None or latest.error else reading.current_number
-            speed = "-----" if number is None else f"{number:.1f}"
+            speed = "-----" if number is None else f"{number:z.1f}"
             style = STATE_STYLES.get(latest.state.kind, PLAIN) if number is not None else FAINT
         lines = drawing(self._paths, speed, style, width)
         return [*lines, *hints(self._paths, width)]
