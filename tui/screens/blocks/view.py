@@ -93,9 +93,7 @@ def _slot_line(
     if changed:
         text.append(" " * spare)
         text.append(cut(f" → {describe(profile, block, proposed)}", 12), ATTENTION)
-        room = width - text.cell_len
-        text.append(f"{slot.text if used else '':>{max(0, min(14, room - 1))}}", FAINT)
-        return _filled(text, width)
+        return _filled(text, width)  # the value read is that of the old mapping
     room = width - text.cell_len - spare
     both = width >= BOTH
     verdict, style = _verdict(block, slot)
