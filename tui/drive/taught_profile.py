@@ -41,6 +41,8 @@ def is_raw(family: Profile, parameter: Parameter) -> bool:
     )
     reported = reported or bool(parameter.enumeration or parameter.bits) or parameter.scale != "1"
     reported = reported or parameter.offset != "0"
+    counters = family.data.port_counters
+    reported = reported or any(parameter.code in (c.frames, c.checksum_errors) for c in counters)
     return not reported and (measured or not is_verified(parameter)) and is_word(parameter)
 
 
