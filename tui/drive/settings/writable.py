@@ -24,7 +24,8 @@ ORDER_QUANTITIES: frozenset[Quantity] = frozenset(
         "digital_outputs",
     }
 )
-"""Quantities that are commands; they have their own screens and CLI commands."""
+"""Quantities that are commands or outputs; they are never written as settings."""
+OUTPUTS: frozenset[Quantity] = frozenset({"digital_inputs", "digital_outputs"})
 AT_REST: frozenset[StateKind] = frozenset({"blocked", "ready", "stopped", "fault"})
 """Kinds of state in which the motor is certainly not commanded to turn."""
 CUTTING = frozenset({"address", "baud", "format", "parity", "protocol"})
@@ -100,19 +101,36 @@ def write_refusal(
     if parameter.access == "r":
         return Refusal("read-only", f"{code} can only be read.")
     if is_order(profile, parameter):
-        return Refusal(
-            "order", f"{code} is a command, not a setting. Use Monitor, or `run` and `stop`."
-        )
+        return Refusal("order", _order_text(profile, parameter))
     if not is_verified(parameter) and code not in confirmed:
         return Refusal(
             "unverified",
             f"{code} is unverified: no document of this family confirms its address"
-            f" {parameter.number}. Compare it with the keypad, then confirm it (--confirm {code}).",
+            f" {parameter.number}. Compare it with the keypad, then confirm it (y on Parameters,"
+            f" or --confirm {code}).",
         )
     if needs_standstill(profile, parameter) and state not in AT_REST:
         text = _NOT_AT_REST if state else _STATE_NOT_KNOWN
         return Refusal("running", text.format(code=code, state=state))
     return None
+
+
+def _order_text(profile: Profile, parameter: Parameter) -> str:
+    """Return why a word that is not a setting is not written, and what to use instead."""
+    code = parameter.code
+    if any(code in block.values for block in profile.data.blocks):
+        return f"{code} is the value of a slot, not a setting. Press X on Scanner."
+    memory = profile.data.memory
+    moves = parameter.quantity in ORDER_QUANTITIES - OUTPUTS - {"save_settings"}
+    if moves or code in _motor_codes(profile):
+        return f"{code} is a command, not a setting. Use Monitor, or `run` and `stop`."
+    if memory.factory is not None and code == memory.factory.parameter:
+        return f"{code} restores the factory settings. Press F on Parameters."
+    if parameter.quantity == "save_settings" or (
+        memory.save is not None and code == memory.save.parameter
+    ):
+        return f"{code} saves the settings. Press S on Parameters, or use `write --save`."
+    return f"{code} is an output or a command, not a setting. Drive Panel has no command for it."
 
 
 _NOT_AT_REST = (
@@ -203,13 +221,18 @@ def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
 @lru_cache(maxsize=32)
 def _order_codes(profile: Profile) -> frozenset[str]:
     """Return the codes of command words, references, and values that a block writes."""
+    values = {code for block in profile.data.blocks for code in block.values}
+    return _motor_codes(profile) | values - {""}
+
+
+@lru_cache(maxsize=32)
+def _motor_codes(profile: Profile) -> frozenset[str]:
+    """Return the codes of command words and references."""
     codes = {reference.parameter for reference in profile.data.references}
     for chart in profile.data.charts:
         codes.add(chart.command)
         codes.update(option.parameter for option in chart.options)
         codes.update(order.parameter for order in chart.orders)
-    for block in profile.data.blocks:
-        codes.update(block.values)
     # the command channel is a setting, although the command to take control writes it too
     channel = profile.quantity("command_channel")
     return frozenset(codes - {"", channel.code if channel else ""})

@@ -167,13 +167,13 @@ def _word(raw: int) -> str:
 
 
 def _news(editor: Editor, parameter: Parameter) -> Text:
-    """Return the latest event: a change by another program, a refusal, a staged or old value."""
+    """Return the latest event: a change in the drive, a refusal, a staged or old value."""
     code = parameter.code
     edit, result = editor.staging.pending(code), editor.staging.results.get(code)
     if code in editor.staging.changed_elsewhere:
         before = text_of(editor, parameter, editor.staging.changed_elsewhere[code])
         message = (
-            f"Changed by another program: it was {before}."
+            f"Changed in the drive since you staged it: it was {before}."
             " Press Delete to drop your edit, y to keep it."
         )
         return Text(message, ALARM)
@@ -196,6 +196,9 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
         return Text(f"{message}.{u}", PLAIN)
     if code not in editor.values.raws:
         return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
+    if refused is not None and refused.reason == "unverified":
+        message = f"Unverified: no document of this family confirms {parameter.number}."
+        return Text(f"{message} Compare it with the keypad, then press y.", FAINT)
     if refused is not None and refused.reason != "read-only":
         return Text(refused.text, FAINT)
     if is_changed(editor, parameter):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..keys.action import ARMING, TEACH, Registration, key_rows
 
-KEEP = "Confirm an unverified parameter, or keep an edit if another program changed the value."
+KEEP = "Confirm an unverified parameter, or keep an edit if the value in the drive has changed."
 
 
 REGISTERED = (

@@ -119,7 +119,7 @@ class StageKeys(ParameterKeys):
         self._stage(code, (edit.new if edit else self.editor.values.raws[code]) + steps)
 
     def action_confirm(self) -> None:
-        """Confirm an unverified parameter, or keep an edit although another program wrote."""
+        """Confirm an unverified parameter, or keep an edit of a value that changed since."""
         from ..dialogs.confirm import Confirm
 
         code = self.listed.code
