@@ -33,7 +33,7 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
     ("●", "white", "the text of this bit is true"),
     ("●", "cyan", "on the tabs Parameters and Scanner: values are staged"),
     ("▲", "amber", "on the tab Line: a problem of the line; on Parameters: not saved to EEPROM"),
-    ("■", "amber", "a setting that differs from its factory setting"),
+    ("■", "amber", "a setting that differs from its factory setting, or from the compared set"),
     ("S", "amber", "a setting that is lost at power-off until S saves it in the EEPROM"),
     ("R", "amber", "a setting that takes effect after a reset of the drive"),
 )

@@ -17,7 +17,7 @@ from tui.session.settings.editor import Editor
 from tui.widgets.drawing import fitted_names, short
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, LINE, PLAIN, STALE, STRONG, TITLE
 
-from .value_text import held_drawn, is_changed, old_text, other_text, range_text
+from .value_text import held_drawn, is_marked, old_text, other_text, range_text
 
 NAME_CELLS, NAME_ROOM = 46, 30
 """Cells of a name at most if no name is longer, and those that it needs before limits are shown."""
@@ -68,6 +68,7 @@ class Columns(NamedTuple):
             + staged
             + other
             + 3
+            + (1 if self.range or self.address else 0)
             + self.range
             + self.address
         )
@@ -155,8 +156,9 @@ def fitting_columns(width: int, filled: Filled) -> Columns:
         ("address", ADDRESS if number == WIDTHS[0][2] else 0, filled.name + longer),
     )
     for column, cells, name in more:
-        if columns.taken + cells + max(8, name) <= width:
-            columns = columns._replace(**{column: cells})
+        wider = columns._replace(**{column: cells})
+        if wider.taken + max(8, name) <= width:
+            columns = wider
     columns = _with_longer_values(columns, width, filled)
     return columns._replace(name=max(8, min(max(NAME_CELLS, filled.name), width - columns.taken)))
 
@@ -204,7 +206,7 @@ def head_line(columns: Columns, other: str) -> Text:
         text.append(f"{'Staged':>{columns.staged + STAGED_MARK}}", TITLE)
     if columns.other:
         text.append(f" {short(other, columns.other):>{columns.other}}", TITLE)
-    text.append("   ")
+    text.append("    " if columns.range or columns.address else "   ")
     if columns.range:
         text.append(f"{'Limits':<{columns.range}}", TITLE)
     if columns.address:
@@ -240,7 +242,7 @@ def _row(editor: Editor, parameter: Parameter, layout: TableLayout) -> Text:
         text.append(f"{short(parameter.number, columns.number - 1):<{columns.number}}", FAINT)
     name = layout.names[parameter.name]
     text.append(f"{name:<{columns.name}}", PLAIN if parameter.access != "r" else FAINT)
-    changed = is_changed(editor, parameter)
+    changed = is_marked(editor, parameter)
     held, style = held_drawn(
         editor,
         code,
@@ -257,6 +259,7 @@ def _row(editor: Editor, parameter: Parameter, layout: TableLayout) -> Text:
     text.append(" ")
     text.append("■" if changed else " ", ALARM)
     text.append(_kept(editor, code), ALARM)
+    text.append(" " if columns.range or columns.address else "")
     if columns.range:
         limits = short(range_text(editor, parameter), columns.range - 1)
         text.append(f"{limits:<{columns.range}}", FAINT)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from tui.drive.profile.schema import Confidence, Parameter
 from tui.drive.settings.factory import factory_is_sure, factory_value, not_factory
 from tui.drive.settings.in_force import LimitsInForce, limits_in_force
+from tui.drive.settings.selection import passes
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.settings.editor import Editor
 from tui.session.shown import Drawn
@@ -76,6 +77,17 @@ def is_changed(editor: Editor, parameter: Parameter) -> bool:
     """Return True if a setting differs from its factory value."""
     values = editor.values
     return not_factory(editor.session.profile, parameter, values.raws, values.lacking)
+
+
+def is_marked(editor: Editor, parameter: Parameter) -> bool:
+    """Return True if a setting differs from the value in the column of the other set.
+
+    That is the factory value, unless another set is compared.
+    """
+    if not editor.other:
+        return is_changed(editor, parameter)
+    held = parameter.code in editor.values.raws
+    return held and passes(editor.facts, "differs", parameter)
 
 
 def text_of(editor: Editor, parameter: Parameter, raw: int) -> str:
