@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from rich.text import Text
 
+from tui.drive.bit_texts import bit_texts
 from tui.drive.profile.profile import notations
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.factory import factory_is_sure
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
 from tui.drive.taught_profile import why_not_taught
-from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits, without_named_bits
+from tui.drive.values import NOT_AVAILABLE, is_enumeration, without_named_bits
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE, STRONG, age_text
@@ -70,7 +71,7 @@ def _help(editor: Editor, parameter: Parameter, width: int, room: int, step: str
 def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
     held, found = editor.values.held(parameter.code), list[str]()
     if parameter.bits and held is not None and held.raw is not None:
-        names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, held.raw))
+        texts = ", ".join(bit_texts(parameter.bits, held.raw))
         when = held_drawn(
             editor,
             parameter.code,
@@ -78,7 +79,7 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
             old=lambda _, age: f"{age_text(age)} ago",
             missing="",
         )
-        found.append(f"{when}: {names or without_named_bits(held.raw)}")
+        found.append(f"{when}: {texts or without_named_bits(held.raw)}")
     # a profile's note on a word without a scale says that it is shown raw
     if parameter.note and parameter.code not in editor.session.profile.taught:
         found.append(parameter.note)
