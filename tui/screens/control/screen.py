@@ -50,9 +50,7 @@ from .view import (
 if TYPE_CHECKING:
     from tui.session.fleet import Fleet
 
-HOW_IT_IS_TESTED = (
-    "Polling pauses for longer and longer, up to about the timeout, until the drive reacts."
-)
+HOW_IT_IS_TESTED = "Polling pauses for longer and longer, up to about the timeout, until it reacts."
 WITH_RUNNING_MOTOR = (
     "THE MOTOR IS RUNNING. It reacts as set, and may coast; a hoist load falls. A stop is sent"
     " when the test ends, or when you press a stop key."
