@@ -20,6 +20,7 @@ from tui.bus.rtu.exchange import REFUSAL, RtuExchange
 from tui.bus.rtu.master import BEFORE_END, RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.trace import Trace
+from tui.bus.transport import serial_posix
 from tui.bus.transport.serial_posix import SHORT_PAUSE, PosixSerial
 from tui.wire.frames import frame
 
@@ -151,3 +152,12 @@ async def test_paused_port_can_be_closed(port: tuple[PosixSerial, Taker, int]) -
     os.write(peer, b"late")
     await asyncio.sleep(0.01)
     assert taker.data == b""
+
+
+async def test_port_that_accepts_no_bytes_is_an_error(
+    port: tuple[PosixSerial, Taker, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(serial_posix, "SEND_TIMEOUT", 0.05)
+    with pytest.raises(OSError, match="the port accepts no bytes"):
+        async with asyncio.timeout(20):
+            await port[0].send(bytes(1_000_000))

@@ -10,7 +10,7 @@ import logging
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import AsyncMock, Mock
 
 import pytest
 
@@ -21,7 +21,8 @@ from tui.bus.model import LineStatus
 from tui.bus.program import KEEPER, Program, pid_namespace
 from tui.bus.share import sharing as sharings
 from tui.bus.share.client import OwnerAway
-from tui.bus.share.messages import VERSION
+from tui.bus.share.greeting import Greeting
+from tui.bus.share.messages import VERSION, Goodbye, packed
 from tui.bus.share.place import Owner, SharePlace
 from tui.bus.share.sharing import DISK_WITHIN, UNKEPT, Sharing
 from tui.bus.shared_state import SharedState
@@ -356,3 +357,12 @@ async def test_stops_are_left_to_the_next_owner(monkeypatch: pytest.MonkeyPatch)
     stopped = bench.inside.facts.stops.late_times
     await bench.it.close(0.0)
     assert bench.did == [("give back", Owner(VERSION, ME, "", 0.0, stopped))]
+
+
+@pytest.mark.parametrize("free", [True, False])
+async def test_owner_makes_way_for_a_program_that_says_goodbye(free: bool) -> None:
+    holder, reader = Mock(makes_way=AsyncMock(return_value=free)), asyncio.StreamReader()
+    reader.feed_data(packed(Goodbye()))
+    greeting = Greeting(Mock(), None, holder, Mock())
+    assert await greeting.heard(reader, Mock(), {}) is None
+    holder.makes_way.assert_awaited_once_with()

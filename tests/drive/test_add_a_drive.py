@@ -39,11 +39,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def test_example_profile_is_found_loaded_and_decodes(folder: Path) -> None:
     (folder / "my-pump.toml").write_text(example(), encoding="utf-8")
     (listing,) = [item for item in library.listings() if item.own]
-    assert (listing.id, listing.name, listing.parameters) == (
-        "example-pump",
-        "Example pump drive",
-        9,
-    )
+    assert listing[:4] == ("example-pump", "Example pump drive", "Example", "1.0")
+    assert listing.parameters == 9
     profile = library.load_file(listing.path)
     frequency = profile["FREQ"]
     assert decode(frequency, -503, {}, Decimal(frequency.scale)).display == "-50.3 Hz"

@@ -236,7 +236,9 @@ def test_scan_recognizes_two_drives_of_different_makes(packaged: None) -> None:
 
 def checked(*changes: tuple[str, str], name: str = "mixer.toml") -> Result:
     row = ROW.format("IN", TYPE + 2) + "function = 4\n"
+    real = ROW.format("REAL", TYPE + 3) + 'type = "float32"\n'
     text = mixer_text() + ROWS + (row if "IN" in str(changes) else "")
+    text += real if "REAL" in str(changes) else ""
     for before, after in changes:
         assert before in text, before
         text = text.replace(before, after)
@@ -257,6 +259,7 @@ def checked(*changes: tuple[str, str], name: str = "mixer.toml") -> Result:
         ('registers = [{ parameter = "TYPE", values = [7] }]', "Add a second register"),
         ('registers = [{ parameter = "KEY", values = [700] }]', "its access must be r"),
         ('registers = [{ parameter = "IN", values = [700] }]', "only read by function 3"),
+        ('registers = [{ parameter = "REAL", values = [7] }]', "a float32 has no exact value."),
         (
             'registers = [{ parameter = "TYPE", begins = ["ABC"] }]',
             "it needs values, or for a text",

@@ -17,6 +17,7 @@ import pytest
 from tui.bus.errors import (
     ChecksumFault,
     DeviceException,
+    LineFailed,
     LineLost,
     LinkSyntaxError,
     NoAnswer,
@@ -34,6 +35,7 @@ from tui.session.fleet import Fleet
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.trend import Trend
 from tui.session.record.history import read_history
+from tui.session.record.newest import NewestReplies
 from tui.session.record.record_file import RecordFile
 from tui.session.record.repeated_cycles import RepeatedCycles, cycles_of
 from tui.session.record.replay_line import REPLAY_SENDS_NOTHING, ReplayLine
@@ -697,3 +699,15 @@ def test_profile_that_has_changed_since_is_reported(tmp_path: Path) -> None:
         assert session.arming.hindrance == REPLAY_SENDS_NOTHING
         assert not session.reads_blocks
         fleet.forget()
+
+
+def test_record_that_cannot_be_read_is_an_error_of_the_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def read(*_: object) -> None:
+        raise sqlite3.DatabaseError("malformed")
+
+    with replayed(record(tmp_path, row(1, (10,))), 2) as line:
+        monkeypatch.setattr(NewestReplies, "last_words", read)
+        with pytest.raises(LineFailed, match=r"^The record cannot be read: malformed\.$"):
+            line.last_reply(1, 3, 100, 1)

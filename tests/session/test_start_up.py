@@ -30,7 +30,12 @@ from tui.session.startup.judging import (
     changed_codes,
     field_fault,
 )
-from tui.session.startup.progress import progress_file, read_progress, start_up_lines
+from tui.session.startup.progress import (
+    StepRecord,
+    progress_file,
+    read_progress,
+    start_up_lines,
+)
 from tui.session.startup.start_up import DEFICIENCY_STAYS, StartUp, begin_again, open_start_up
 from tui.session.startup.steps import GuideField
 
@@ -193,6 +198,22 @@ def test_deficiency_stays_open_until_tested_again() -> None:
     assert made.progress.steps["Insulation"].state == "done"
     assert "wet cable" in made.record.past[0]
     assert "3.5" in made.record.past[0]
+
+
+def test_next_step_is_the_next_that_is_open_or_deficient() -> None:
+    made = begun()
+    steps = [step.step for step in made.guide.steps]
+    here = steps.index(made.step.step)
+    for place in (1, 2):
+        made.progress.steps[steps[here + place]] = StepRecord(state="skipped")
+    made.go_on()
+    assert made.step.step == steps[here + 3]
+    made.progress.steps.update((step, StepRecord(state="done")) for step in steps)
+    made.go_on()
+    assert made.step.step == steps[here + 3]
+    made.progress.steps[steps[1]] = StepRecord(state="deficient")
+    made.go_on()
+    assert made.step.step == steps[1]
 
 
 def test_settings_are_done_only_if_read_and_written() -> None:

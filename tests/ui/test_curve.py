@@ -493,6 +493,17 @@ def test_cursor_shows_values_of_its_moment_and_none_in_a_gap() -> None:
     assert gap[1:9] == ["output", "-----", "Hz", "current", "-----", "A", "reference", "-----"]
 
 
+@pytest.mark.parametrize(("after", "text"), [(2.9, "29.0"), (3.1, "-----")])
+def test_value_at_the_cursor_is_at_most_three_cycles_old(after: float, text: str) -> None:
+    points = tuple(TrendPoint(940.0 + at, (float(at), 1.0, 50.0)) for at in range(30))
+    view = replace(view_of(ATV71, fakes.RUNNING), trend=points, period=1.0, apart=0.0)
+    view = replace(view, page=940.0, cursor=969.0 + after)
+    assert view.snapshot is not None
+    view = replace(view, snapshot=replace(view.snapshot, rate=1.0))
+    heading = curve_lines(view, arrange(120, 40, 9))[0].plain.split()
+    assert heading[1:3] == ["output", text]
+
+
 def test_cell_under_the_cursor_is_marked_in_every_row() -> None:
     rows = curve_rows([Curve([(130.0, 30.0)], PEN)], plot_of(), 1.5, cursor=15)
     for row in rows:

@@ -81,7 +81,9 @@ async def test_number_of_the_nameplate_is_proposed_and_only_staged() -> None:
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
         await made.pilot.pause(0.4)
-        await made.pilot.press(*"400", "enter")
+        await made.pilot.press(*"4k", "enter")
+        await until(made.pilot, lambda: "4k" in str(made.app.screen.query_one("#fault").render()))
+        await made.pilot.press("backspace", *"00", "enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
         await until(
             made.pilot, lambda: "→ 400 V" in str(made.app.screen.query_one("#held").render())

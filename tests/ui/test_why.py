@@ -138,3 +138,18 @@ def test_picture(snap_compare: Callable[..., bool], size: tuple[int, int]) -> No
         await pilot.pause()
 
     assert snap_compare(app, terminal_size=size, run_before=requested)
+
+
+@pytest.mark.internal_errors
+async def test_unexpected_error_closes_the_dialog_and_is_logged(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    async def look() -> Diagnosis:
+        raise RuntimeError("a defect")
+
+    async with panel() as made:
+        made.app.push_screen(WhyScreen("drive 1", look))
+        await made.until(lambda: not isinstance(made.app.screen, WhyScreen) and caplog.messages)
+        assert made.app.events.newest is not None
+        assert made.app.events.newest.text == "Internal error: a defect"
+    assert "looking for why failed" in caplog.messages

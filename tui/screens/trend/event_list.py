@@ -96,7 +96,7 @@ def _line(event: TrendEvent, now: float, plain: bool, width: int, *, selected: b
     line.append(time.strftime(form, when), FAINT)
     line.append(sign, style)
     drive = f"{event.device} " if event.device is not None else ""
-    text = short(f" {drive}{event.text}", max(1, width - line.cell_len))
+    text = short(f" {drive}{event.text}", width - line.cell_len)
     line.append(text, STRONG if selected else PLAIN)
     if selected:
         line.append(" " * max(0, width - line.cell_len))
