@@ -235,6 +235,8 @@ def histories() -> Iterator[str]:
         [replace(entry, answer="reset")], [entry, replace(later, answer="reset")],
         [entry, replace(later, answer="reset"), replace(later, answer="reset")],
         [replace(entry, time="never")], [entry, replace(later, code="COM")],
+        [replace(entry, code="", new=""), replace(later, answer="code read")],
+        [replace(entry, code="", new=""), replace(later, answer="reset")],
     ):  # fmt: skip
         yield short(last_trip(entries))
 

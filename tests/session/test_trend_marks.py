@@ -217,6 +217,16 @@ def test_command_of_two_seconds_before_may_be_the_cause_of_a_start(
     assert (found.mark, found.by) == ("start", by)
 
 
+def test_command_without_a_reference_does_not_change_the_reference() -> None:
+    marker = TrendMarker()
+    marker.commands.append(trends.TrendWrite(100.0, "run", reference=False))
+    marker.commands.append(trends.TrendWrite(100.0, "panel"))
+    for time, reference in ((99.0, 50.0), (99.5, 50.0)):
+        marker.mark(replace(RUNNING, time=time), reference)
+    found = marker.mark(replace(RUNNING, time=100.5), 40.0)
+    assert (found.mark, found.by) == ("reference", ("panel",))
+
+
 def test_trend_is_noted_every_two_seconds_or_hundred_points() -> None:
     facts, trend = Mock(), Mock(kind="trend atv71")
     notes = TrendNotes(facts, 2, trend)

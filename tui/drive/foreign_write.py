@@ -88,20 +88,27 @@ def parameters_at(words: Collection[ExternalWord]) -> list[Parameter]:
     return list({p.code: p for word in words for p in word.parameters}.values())
 
 
+def has_reference(profile: Profile, words: Collection[ExternalWord]) -> bool:
+    """Return True if a reference is among the words of a write."""
+    return any(_is_reference(profile, parameter) for parameter in parameters_at(words))
+
+
+def _is_reference(profile: Profile, parameter: Parameter) -> bool:
+    references = {reference.parameter for reference in profile.data.references}
+    own = parameter.code in references
+    return own or parameter.quantity in ("command_frequency", "command_speed")
+
+
 def starts_by(profile: Profile, words: Collection[ExternalWord]) -> StartDirection | None:
     """Return the direction in which words may start the motor; None if they cannot.
 
     Every command counts, but not a reference: it starts nothing without an enabling command.
     """
-    references = {reference.parameter for reference in profile.data.references}
     found = [
         word
         for word in words
         if word.kind is WordKind.COMMAND
-        and not all(
-            p.code in references or p.quantity in ("command_frequency", "command_speed")
-            for p in word.parameters
-        )
+        and not all(_is_reference(profile, p) for p in word.parameters)
     ]
     back = {
         unsigned(order.words[-1])

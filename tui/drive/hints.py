@@ -192,10 +192,10 @@ def hint_markdown(
     lines = []
     if left.probable:
         lines.append(f"- Probably ({TRUST[left.confidence]}): {_joined(left.probable)}")
-    lines += [f"- {known.text}: {known.reason}." for known in left.supported]
+    lines += [f"- {known.text.rstrip('.')}: {known.reason}." for known in left.supported]
     if left.check:
         lines.append(f"- Check (general practice): {_joined(left.check)}")
-    lines += [f"- {advice.text}: {advice.reason}." for advice in left.excluded]
+    lines += [f"- {advice.text.rstrip('.')}: {advice.reason}." for advice in left.excluded]
     lines += [
         f"- Check {look.code}, {profile[look.code].name}: {value(look.code)} ({look.why})"
         for look in hint.look_at

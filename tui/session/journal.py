@@ -86,6 +86,7 @@ FAULT_WHYS = {
     "tripped": "the trip was seen",
     "seen": "in fault when first seen",
     "reset": "the end was seen",
+    "code read": "the code was read after the state",
 }
 """Reason by the answer of a `fault` entry. Older files have `seen from here` for each."""
 RECORD_SHOWS_IT = "the record of the line shows it"

@@ -228,13 +228,16 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
         causes = "; ".join(left.probable)
         probably = f"{causes} ({TRUST[left.confidence]})" if causes else ALL_RULED_OUT
         rows.append(("  probably", f"{found.alarm}: {probably}" if found.alarm else probably))
-        rows += [("  supported", f"{advice.text}: {advice.reason}") for advice in left.supported]
+        rows += [
+            ("  supported", f"{advice.text.rstrip('.')}: {advice.reason}")
+            for advice in left.supported
+        ]
         if left.check:
             rows.append(("  check", f"{'; '.join(left.check)} ({TRUST['practice']})"))
         rows += [
             (
                 "  not needed" if advice.text not in hint.probable else "  ruled out",
-                f"{advice.text}: {advice.reason.removeprefix('ruled out, ')}",
+                f"{advice.text.rstrip('.')}: {advice.reason.removeprefix('ruled out, ')}",
             )
             for advice in left.excluded
         ]

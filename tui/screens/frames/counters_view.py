@@ -160,11 +160,17 @@ def bar_lines(shown: Sequence[TurnaroundBar], rows: int) -> list[Text]:
     return [*lines, counts, Text("".join(f"{end:>{BAR_WIDTH}}" for end in ends), FAINT)]
 
 
+NOT_COMPARED = "Not compared: the drive's own counters were not read."
+
+
 def message(found: CountersNow, width: int, room: int) -> list[Text]:
     """Return the differences, lost frames first, or one row if the counters agree.
 
     If they exceed `room` rows, each is shortened to one row.
     """
+    if found.trouble and not found.differences:
+        text = Text(no_wrap=True).append(" ■ ", ALARM)
+        return [text.append(short(NOT_COMPARED, width - 4), PLAIN)]
     if found.agree:
         text = Text(no_wrap=True).append(" ● ", RUNNING)
         return [text.append(short(found.agreeing, width - 4), PLAIN)]

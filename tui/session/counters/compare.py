@@ -189,18 +189,28 @@ def _differences(found: Comparison) -> Iterator[Difference]:
         yield Difference("not-from-here", foreign, counted(foreign, *_FOREIGN))
 
 
-def own_differences(ours: DeviceCounters) -> list[Difference]:
+_UNANSWERED_YET = (
+    "1 frame got no reply. The drive's counters do not show where it was lost.",
+    "{count} frames got no reply. The drive's counters do not show where they were lost.",
+)
+
+
+def own_differences(
+    ours: DeviceCounters, *, unanswered: int | None = None, compared: bool = False
+) -> list[Difference]:
     """Return the differences that this program's counts alone show.
 
-    For drives without counters, and drives that do not answer.
+    For drives without counters, and drives that do not answer. `unanswered` are the timeouts that
+    are not explained otherwise (default: all). `compared` is True with the drive's counters.
     """
+    unanswered = ours.timeouts if unanswered is None else unanswered
     found = []
     if ours.checksum:
         text = counted(ours.checksum, *_DAMAGED_HERE)
         found.append(Difference("damaged-here", ours.checksum, text))
-    if ours.timeouts:
-        text = counted(ours.timeouts, *_UNANSWERED)
-        found.append(Difference("no-answer", ours.timeouts, text))
+    if unanswered:
+        text = counted(unanswered, *(_UNANSWERED_YET if compared else _UNANSWERED))
+        found.append(Difference("no-answer", unanswered, text))
     return found
 
 

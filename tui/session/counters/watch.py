@@ -46,13 +46,21 @@ def stray_difference(
     frames = [frame for frame in frames if frame.time > since]
     found = measure_of(frames, device, tcp=tcp)
     kinds = (
-        (found.duplicated, "copies of replies"),
-        (found.late, "replies after their timeout"),
-        (found.second, "second replies with other values"),
-        (found.behind, "replies to the request before"),
-        (found.foreign, "replies of other addresses"),
+        (found.duplicated, "1 copy of a reply", "{count} copies of replies"),
+        (found.late, "1 reply after its timeout", "{count} replies after their timeout"),
+        (
+            found.second,
+            "1 second reply with other values",
+            "{count} second replies with other values",
+        ),
+        (found.behind, "1 reply to the request before", "{count} replies to the request before"),
+        (found.foreign, "1 reply of another address", "{count} replies of other addresses"),
     )
-    seen = ", ".join(f"{number} {text}" for number, text in kinds if number) or LIKELY
+    shown = [counted(number, single, several) for number, single, several in kinds if number]
+    rest = count - sum(number for number, _, _ in kinds)
+    if shown and rest > 0:
+        shown.append(f"{rest} of unknown kind")
+    seen = ", ".join(shown) or LIKELY
     master = [] if tcp or not (heard := overheard(frames, since)).requests else [heard.text]
     text = counted(
         count,
@@ -64,6 +72,8 @@ def stray_difference(
     return [Difference("strays", count, text)]
 
 
+UNANSWERED_KINDS = ("never-arrived", "damaged-there")
+"""Differences of the drive's counters that explain missing replies."""
 DIAGNOSTICS = 8
 ECHO, RESET, DAMAGED, FRAMES = 0x00, 0x0A, 0x0C, 0x0E
 """Sub-functions of function 8."""
@@ -101,10 +111,15 @@ class CountersNow:
     differences: tuple[Difference, ...] = ()
     line_minute: LastMinute = field(default_factory=LastMinute)
 
+    has_own: bool = False
+    """True if the profile names counters of the drive."""
+    refused: bool = False
+    """True if the drive refused to report them."""
+
     @property
     def agree(self) -> bool:
-        """True if every frame was counted and answered."""
-        return not self.differences
+        """True if every frame was counted and answered, and both sides were read."""
+        return not self.differences and not self.trouble
 
     @property
     def compared(self) -> Comparison | None:
@@ -119,7 +134,13 @@ class CountersNow:
         comparison = self.compared
         if comparison is None:
             text = f"Frames sent: {self.since.requests}. None was lost."
-            return text if self.drive else f"{text} The drive reports no counters of its own."
+            if self.drive:
+                return text
+            if not self.has_own:
+                return f"{text} The drive reports no counters of its own."
+            if self.refused:
+                return f"{text} The drive refused to report its own counters."
+            return f"{text} The drive's own counters are not read yet."
         return f"Frames counted by the drive: {comparison.frames}. All were sent here and answered."
 
 
@@ -137,6 +158,7 @@ class CounterWatch:
     _since: float = field(init=False)
     """Time of the last frame before the reset, on the line's clock."""
     _looked: bool = False
+    _refused: bool = False
     _drive: dict[str, Comparison] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -236,6 +258,7 @@ class CounterWatch:
         if self.counted_by:
             await self.session.clock.sleep(COUNTS_ARRIVE_WITHIN)
         after = self._ours
+        self._refused = found is None
         if found is None:
             return
         now = DriveCount(
@@ -291,6 +314,8 @@ class CounterWatch:
             tuple(self._drive.items()),
             self.trouble,
             line_minute=line.minute,
+            has_own=self.has_diagnostics or bool(self.session.profile.data.port_counters),
+            refused=self._refused,
         )
         strays = stray_difference(
             line.stale - self._line.stale,
@@ -316,7 +341,8 @@ def _differences_since(mine: Comparison | None, since: DeviceCounters) -> tuple[
     reported = differences(mine) if mine is not None else []
     if any(difference.kind == "not-answered" for difference in reported):
         return tuple(reported)
-    more = own_differences(since)
-    if mine is not None:
-        more = [difference for difference in more if difference.kind == "damaged-here"]
-    return (*reported, *more)
+    if mine is None:
+        return (*reported, *own_differences(since))
+    explained = sum(each.count for each in reported if each.kind in UNANSWERED_KINDS)
+    open_ = max(0, since.timeouts - explained)
+    return (*reported, *own_differences(since, unanswered=open_, compared=True))

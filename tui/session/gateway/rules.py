@@ -84,6 +84,9 @@ def unit_map(lines: int, texts: Sequence[str]) -> Mapping[int, tuple[int, int]]:
         line, device = int(match[3]), int(match[4] or match[1])
         if not 1 <= line <= lines:
             raise RulesError(f"{text!r}: there is no line {line}. Lines given: {lines}.")
+        if last < first:
+            right = f"{last}-{first}={text.strip().partition('=')[2]}"
+            raise RulesError(f"{first}-{last} ends before it begins. Use {right}.")
         if not 1 <= first <= last <= 255 or not 1 <= device <= HIGHEST_DEVICE - (last - first):
             raise RulesError(f"{text!r}: use ids 1 to 255, and devices 1 to {HIGHEST_DEVICE}.")
         for offset in range(last - first + 1):

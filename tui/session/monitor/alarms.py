@@ -136,6 +136,7 @@ class LineAlarms:
             # the code may be read a cycle after the state
             self._active[device] = replace(was, code=code, name=name)
             self._events.add("fault", f"The fault is {_called(self._active[device])}.", device)
+            self._record(self._active[device], "code read")
             return False
         first = next(iter(self._active.values()), None)
         onset = onsets.get(device)

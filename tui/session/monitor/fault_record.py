@@ -93,13 +93,17 @@ class Recorder:
 
     def take(self, snapshot: Snapshot) -> None:
         """Keep a snapshot; the first one of a fault creates the record. In the line's thread."""
-        if snapshot.error or snapshot.state.kind == "unknown":
+        if not snapshot.error and snapshot.state.kind == "unknown":
             return
         if self.since is None:
+            if snapshot.error:
+                return
             self.since = snapshot.time
         self._moments.append((snapshot, snapshot.time))
         while self._moments[0][1] < snapshot.time - SECONDS_KEPT:
             self._moments.popleft()
+        if snapshot.error:
+            return
         before, self._kind = self._kind, snapshot.state.kind
         if self._kind == "fault" and before not in ("fault", "unknown"):
             self.latest = self._freeze(snapshot)
@@ -121,13 +125,13 @@ class Recorder:
             and datetime.fromisoformat(entry.time) >= begin
         )
         moments = tuple(
-            Moment(s.time, s.wall, s.state.headline, tuple(_text(s.readings.get(c)) for c in codes))
-            for s, _ in self._moments
+            Moment(s.time, s.wall, *_state_and_texts(s, codes)) for s, _ in self._moments
         )
-        earlier = [snapshot for snapshot, _ in self._moments if snapshot is not now]
+        known = [s for s, _ in self._moments if not s.error]
+        earlier = [snapshot for snapshot in known if snapshot is not now]
         before = earlier[-1].readings if earlier else {}
         curve = trend_codes(profile)
-        points = tuple(TrendPoint(s.time, trend_values(curve, s)) for s, _ in self._moments)
+        points = tuple(TrendPoint(s.time, trend_values(curve, s)) for s in known)
         return FaultRecord(
             now.time, now.wall, now.state.fault, codes, headings, moments, writes, before,
             points, now.period,
@@ -158,6 +162,16 @@ def _text(reading: Shown | None) -> str:
         old=lambda value, age: NOT_AVAILABLE,
         missing=NOT_AVAILABLE,
     )
+
+
+NO_ANSWER_STATE = "no answer"
+
+
+def _state_and_texts(snapshot: Snapshot, codes: Sequence[str]) -> tuple[str, tuple[str, ...]]:
+    """Return the state and the values of a cycle; none of a cycle without an answer."""
+    if snapshot.error:
+        return NO_ANSWER_STATE, (NOT_AVAILABLE,) * len(codes)
+    return snapshot.state.headline, tuple(_text(snapshot.readings.get(code)) for code in codes)
 
 
 def record_text(

@@ -15,7 +15,7 @@ from tui.bus.notes import LONGEST_KIND, LineNote
 from tui.bus.program import readable
 from tui.bus.requests import BROADCAST
 from tui.bus.shared_state import SharedState
-from tui.drive.foreign_write import WordKind, classify_words
+from tui.drive.foreign_write import WordKind, classify_words, has_reference
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 from tui.wire.frames import BIT_READS, at_place
@@ -169,7 +169,8 @@ class Trend:
         if codes:
             self._marker.writes.append(TrendWrite(written.time, by, tuple(dict.fromkeys(codes))))
         if len(settings) < len(words):
-            self._marker.commands.append(TrendWrite(written.time, by))
+            reference = has_reference(self._profile, words)
+            self._marker.commands.append(TrendWrite(written.time, by, reference=reference))
 
     def add(self, cycle: TrendCycle) -> TrendPoint:
         """Add a cycle; a failed cycle leaves a gap, never a repeated value."""
@@ -210,6 +211,8 @@ class TrendWrite(NamedTuple):
     time: float
     by: str
     codes: tuple[str, ...] = ()
+    reference: bool = True
+    """False for a command that does not change the reference."""
 
 
 class MarkedEvent(NamedTuple):
@@ -251,6 +254,8 @@ class TrendMarker:
         if mark not in COMMANDED:
             return MarkedEvent(mark)
         recent = [item for item in self.commands if cycle.time - item.time <= COMMAND_REACH]
+        if mark == "reference":
+            recent = [item for item in recent if item.reference]
         return MarkedEvent(mark, _programs(recent))
 
     def _events(self, state: DriveState | None, reference: float | None) -> Iterator[TrendMark]:

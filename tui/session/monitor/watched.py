@@ -79,10 +79,13 @@ def last_trip(entries: Sequence[Entry]) -> SeenTrip | None:
         when = time_of(entry) if entry.kind == "fault" else None
         if when is None:
             continue
-        if entry.answer == "reset":
-            if found is not None and found.reset is None:
-                found = SeenTrip(found.wall, found.fault, found.tripped, when.timestamp())
-            continue
         name = f"{entry.code} {entry.new}".strip()
+        if found is not None and found.reset is None and entry.answer in ("reset", "code read"):
+            # the code may be read a cycle after the state
+            reset = when.timestamp() if entry.answer == "reset" else None
+            found = SeenTrip(found.wall, found.fault or name, found.tripped, reset)
+            continue
+        if entry.answer == "reset":
+            continue
         found = SeenTrip(when.timestamp(), name, entry.answer == "tripped")
     return found
