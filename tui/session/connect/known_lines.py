@@ -16,6 +16,8 @@ from typing import Any
 from tui.bus.errors import LinkSyntaxError
 from tui.bus.link import Link, SerialLink, label, parse_link
 from tui.bus.transport.port_names import PortName, lasting_name
+from tui.drive.errors import DriveError
+from tui.drive.profile import library
 from tui.drive.profile.library import version_shown
 from tui.drive.small_file import read_small_text
 
@@ -61,7 +63,19 @@ class DriveMark:
         name_text = " ".join(part for part in (self.reference or self.vendor, self.name) if part)
         shown = version_shown(self.profile, self.version)
         version = f"version {shown}" if shown else ""
-        return ", ".join(part for part in (name_text, version) if part) or self.profile or "a drive"
+        return (
+            ", ".join(part for part in (name_text, version) if part)
+            or _family(self.profile)
+            or "a drive"
+        )
+
+
+def _family(profile: str) -> str:
+    """Return the name of a profile; its id if it cannot be read."""
+    try:
+        return library.load(profile).name if profile else ""
+    except DriveError:
+        return profile
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
@@ -24,6 +25,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tui.bus.errors import LinkSyntaxError
 from tui.drive.profile.library import user_folder
+from tui.drive.sentences import first_of
 from tui.drive.small_file import read_small_text
 
 if TYPE_CHECKING:
@@ -36,7 +38,8 @@ RECORD_TABLE, RECORD_KEY = "record", "on"
 REPORT_TABLE = "report"
 SETTINGS_TABLES = LINES_TABLE, RECORD_TABLE, REPORT_TABLE
 LONGEST_NAME = 60
-MOST_NAMED = 200
+MOST_NAMED, NAMES_LISTED = 200, 3
+"""Names that are read, and names of the others that a message lists."""
 _NAME = re.compile(r"(?!COM\d+$)[A-Za-z][A-Za-z0-9_-]{0,31}", re.IGNORECASE)
 _TAKEN = frozenset({"factory"})
 """Words with another meaning at the position of a LINE."""
@@ -200,6 +203,9 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
                 )
             )
             continue
+        if unread := list(value)[MOST_NAMED:]:
+            names_left = first_of([*map(str, unread)], NAMES_LISTED)
+            faults.append(((key,), f"only {MOST_NAMED} names are read, not {names_left}"))
         for name, reported in list(value.items())[:MOST_NAMED]:
             if fault := next(_faults(name, reported, found), None):
                 faults.append(fault)
@@ -220,13 +226,13 @@ def _is_recorded(tables: Mapping[str, Any]) -> bool:
 def _record_faults(table: object) -> Iterator[tuple[TomlPath, str]]:
     """Yield the errors of the table that turns the record off."""
     if not isinstance(table, dict):
-        yield (RECORD_TABLE,), f"a table with {RECORD_KEY} is wanted"
+        yield (RECORD_TABLE,), f"expected a table with {RECORD_KEY}"
         return
     for key, value in table.items():
         if key != RECORD_KEY:
             yield (RECORD_TABLE, key), f"only {RECORD_KEY} is known here"
         elif not isinstance(value, bool):
-            yield (RECORD_TABLE, key), "true or false is wanted"
+            yield (RECORD_TABLE, key), "expected true or false"
 
 
 def _report_names(table: object) -> tuple[ReportNames, list[tuple[TomlPath, str]]]:
@@ -247,34 +253,47 @@ def _report_names(table: object) -> tuple[ReportNames, list[tuple[TomlPath, str]
     return ReportNames(**found), faults
 
 
+NAME_FORM = (
+    "a name is a letter with up to 31 letters, digits, - and _, but not `factory` or a COM port"
+)
+
+
 def _faults(
     name: str, reported: object, others: Mapping[str, NamedLine]
 ) -> Iterator[tuple[TomlPath, str]]:
     """Yield the errors of one name."""
     here: TomlPath = (LINES_TABLE, name)
     if not is_name(name):
-        yield here, "a name is a letter with up to 31 letters, digits, - and _, and no word of ours"
+        yield here, NAME_FORM
     elif name.casefold() in others:
-        yield here, f"{others[name.casefold()].name} is this name already"
+        known = others[name.casefold()].name
+        yield here, f"{known} has this name already; capital letters do not distinguish names"
     row = here
     if isinstance(reported, dict):
         row = (*here, "line") if "line" in reported else here
     elif isinstance(reported, str):
         reported = {"line": reported}
     else:
-        yield here, f"a LINE in quotes, or a table with {', '.join(_KEYS)}, is wanted"
+        yield here, f"expected a LINE in quotes, or a table with {', '.join(_KEYS)}"
         return
     for key in reported:
         if key not in _KEYS:
             yield (*here, key), f"only {', '.join(_KEYS)} are known here"
     line = reported.get("line")
-    if not isinstance(line, str) or not line.strip() or is_name(line.strip()):
-        yield row, "`line` has to be a LINE in quotes"
+    if not isinstance(line, str) or not line.strip():
+        yield row, "expected a LINE in quotes"
+    elif is_name(line.strip()):
+        yield row, f'{line.strip()!r} is not a LINE. Use for example "tcp:192.168.0.10"'
     device, profile = reported.get("device"), reported.get("profile")
     if "device" in reported and (type(device) is not int or device not in _DEVICES):
-        yield (*here, "device"), f"a slave address from 1 to 247 is wanted, not {device!r}"
+        yield (*here, "device"), f"expected an address from 1 to 247, not {_toml(device)}"
     if "profile" in reported and (not isinstance(profile, str) or not profile.strip()):
-        yield (*here, "profile"), "the id of a profile in quotes is wanted"
+        yield (*here, "profile"), "expected the id of a profile in quotes"
+
+
+def _toml(value: object) -> str:
+    """Return a value as the file has it."""
+    return str(value).lower() if isinstance(value, bool) else repr(value)
 
 
 def _named(name: str, reported: Any) -> NamedLine:
@@ -312,14 +331,14 @@ def _salvaged(text: str, name: str) -> NamedLine | None:
             own.append(value if "{" in value else f"line ={value}")
     for row in own:
         parts |= {f[1]: f[2] or f[3] or f[4] or "" for f in _PAIR.finditer(row)}
-    if not parts.get("line"):
+    if not parts.get("line", "").strip():
         return None
     found = NamedLine(name, parts["line"].strip(), profile=parts.get("profile") or None)
     if not any("device" in row for row in own):
         return found
     if not parts.get("device", "").isdecimal() or int(parts["device"]) not in _DEVICES:
         raise SettingsError(
-            f"{settings_file()} is broken, and the address of {name} cannot be made out. Write:"
-            f" drivepanel stop {found.line} -d ADDRESS"
+            f"{settings_file()} is not valid, and the address of {name} cannot be read from it."
+            f" Run: drivepanel stop {shlex.quote(found.line)} -d ADDRESS"
         )
     return found._replace(device=int(parts["device"]))

@@ -7,6 +7,8 @@ import sqlite3
 import tempfile
 from pathlib import Path
 
+from ..logs import log_file
+
 _WORDS = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "this user's share of the disk is full",
@@ -27,19 +29,30 @@ _VAGUE = (sqlite3.SQLITE_IOERR, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_READONLY
 _TRIED_BYTES = 1 << 16
 
 
+class InternalFault(OSError):
+    """Internal error of the recorder, which is no error of a disk."""
+
+
 def disk_words(error: OSError) -> str:
     """Return an error in plain words; unchanged if there are none for it."""
+    if isinstance(error, InternalFault):
+        return f"internal error, see the log {log_file()}"
     return _WORDS.get(error.errno or 0) or error.strerror or str(error)
 
 
-def unrecorded_text(why: str, folder: Path, rows: int) -> str:
-    """Return the message that nothing is recorded; `rows` is how many wait in memory at most."""
-    return (
-        f"Nothing is recorded: {why}: {folder}."
+def unrecorded_text(why: str, folder: Path | None, rows: int) -> str:
+    """Return the message that nothing is recorded; `folder` is None for an internal error.
+
+    `rows` is how many wait in memory at most.
+    """
+    text = (
+        f"Nothing is recorded: {why if folder is None else f'{why}: {folder}'}."
         f" Up to {rows:,} rows wait in memory, further ones are lost."
         " Drives are polled and stopped as before."
-        " Recording goes on when the folder can be written."
     )
+    if folder is None:
+        return f"{text} Recording is tried again automatically."
+    return f"{text} Recording goes on when the folder can be written."
 
 
 def from_sqlite(error: sqlite3.Error, path: Path) -> OSError:

@@ -18,7 +18,7 @@ from tui.bus.model import EndedExchange
 from tui.drive.sentences import counted
 
 from .clock_jumps import ClockJumps
-from .disk_trouble import disk_words, unrecorded_text
+from .disk_trouble import InternalFault, disk_words, unrecorded_text
 from .ring import (
     DAMAGED_MARK,
     MOST_RECORDED,
@@ -219,7 +219,7 @@ class LineRecorder:
             self._fail(error, now)
         except Exception as error:
             log.exception("the recorder")
-            self._fail(OSError(repr(error)), now)
+            self._fail(InternalFault(str(error)), now)
 
     def _write_waiting(self) -> None:
         while self._waiting or self._batch:
@@ -377,7 +377,9 @@ class LineRecorder:
             with suppress(OSError):
                 self._set_aside(error)
         if first:
-            self._tell(unrecorded_text(self._why, self._folder, RECORD_BACKLOG))
+            internal = isinstance(error, InternalFault)
+            folder = None if internal else self._folder
+            self._tell(unrecorded_text(self._why, folder, RECORD_BACKLOG))
 
     def _tell(self, text: str) -> None:
         log.warning("%s", text)
