@@ -30,8 +30,8 @@ class ScanEstimate:
         bauds = [f"{baud}" for baud in dict.fromkeys(setting.baud for setting in settings)]
         can = families_at(known_profiles(), settings)
         return (
-            f"Not searched yet: {all_of(sorted(bauds, key=int))} baud, {self.seconds(settings):.0f} s"
-            f" more, for {all_of(can)} only. Press {ends} to stop."
+            f"Not searched yet: {all_of(sorted(bauds, key=int))} baud,"
+            f" {self.seconds(settings):.0f} s more, for {all_of(can)} only. Press {ends} to stop."
         )
 
 
