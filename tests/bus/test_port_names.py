@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import errno
+import os
+from types import SimpleNamespace
 
 import pytest
 
 from tests.adapters import Adapters, adapters
+from tui.bus.errors import PortBusy, PortMissing, PortRefused
+from tui.bus.transport import ports
 from tui.bus.transport.port_names import lasting_name
 from tui.bus.transport.ports import PortSeen, port_error
 
@@ -102,3 +106,21 @@ def test_port_without_permission_names_its_group(
     monkeypatch.setattr("tui.bus.transport.ports.see_port", lambda _: seen)
     error = port_error(PORT_PATH, 19200, "8E1", PermissionError(errno.EACCES, "denied"))
     assert output in str(error)
+
+
+@pytest.mark.parametrize(
+    ("system", "text", "kind"),
+    [
+        ("nt", "FileNotFoundError(2, ...)", PortMissing),
+        ("nt", "PermissionError(13, ...)", PortBusy),
+        ("nt", "OSError(22, ...)", PortRefused),
+        ("posix", "FileNotFoundError(2, ...)", PortRefused),
+        ("posix", "PermissionError(13, ...)", PortRefused),
+    ],
+)
+def test_error_without_a_number_is_known_by_its_text_on_windows(
+    system: str, text: str, kind: type[Exception], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ports, "os", SimpleNamespace(**vars(os) | {"name": system}))
+    monkeypatch.setattr(ports, "list_ports", list)
+    assert type(port_error("COM9", 9600, "8N1", Exception(text))) is kind

@@ -169,5 +169,11 @@ EQUIVALENT: dict[str, str] = {
     ),
     "tui/screens/monitor/assembly.py:motor_lines: argument: zip(values, labels, strict=True) ->"
     " zip(values, labels)": ("Each value has a label."),
+    "tui/drive/settings/compare.py:_row: constant: True -> False": (
+        "It is `strict` of a zip of two pairs."
+    ),
+    "tui/drive/teaching.py:_agrees: constant: 0 -> 1": (
+        "A number of a display is digits with decimals: its exponent is never above 0."
+    ),
 }
 """By the identity of the defect, as `python -m tests.mutants --random` prints it."""
