@@ -20,6 +20,7 @@ from tests.recorded import result, sections
 from tests.session.test_recorded_texts import ENTRIES, NOON
 from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
 from tui.bus.model import TURNAROUND_EDGES, DeviceCounters
+from tui.drive.bit_texts import short_bit
 from tui.drive.control_source import source_changes
 from tui.screens.command.teaching import fault_of_look, words_to_teach
 from tui.screens.connection import choices, wall
@@ -150,7 +151,7 @@ def rooms() -> Iterator[str]:
     yield f"{[words.bit_columns(width) for width in (20, 40, 60, 80, 120)]}"
     yield f"{[p.code for p in words.shown_words(watched)]}"
     for bit in profile["STAT"].bits:
-        yield f"{words.short_bit(bit, on=True)} {words.short_bit(bit, on=False)}"
+        yield f"{short_bit(bit, on=True)} {short_bit(bit, on=False)}"
     yield f"{[curves.span_text(seconds) for seconds in (0.5, 6, 60, 90, 600, 7200)]}"
     for cells, barred in product((10, 30, 60), (False, True)):
         yield f"{assembly.value_cells(cells, barred)}"

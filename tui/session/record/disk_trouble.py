@@ -7,8 +7,6 @@ import sqlite3
 import tempfile
 from pathlib import Path
 
-from ..logs import log_file
-
 _WORDS = {
     errno.ENOSPC: "the disk is full",
     errno.EDQUOT: "this user's share of the disk is full",
@@ -36,7 +34,7 @@ class InternalFault(OSError):
 def disk_words(error: OSError) -> str:
     """Return an error in plain words; unchanged if there are none for it."""
     if isinstance(error, InternalFault):
-        return f"internal error, see the log {log_file()}"
+        return "internal error (see the log)"
     return _WORDS.get(error.errno or 0) or error.strerror or str(error)
 
 
