@@ -86,9 +86,12 @@ def _plain(value: object) -> str:
 
 
 def recorded_modules() -> Iterator[str]:
-    """Yield the names of tests with `SECTIONS`, and the path of their file in `TEXTS`."""
+    """Yield the names of tests with `SECTIONS`, and the path of their file in `TEXTS`.
+
+    Those of the source itself are first: what they record are variables before any use.
+    """
     folder = Path(__file__).parent
-    for path in sorted(folder.rglob("test_*.py")):
+    for path in sorted(folder.rglob("test_*.py"), key=lambda path: (len(path.parts), path)):
         text = path.read_text("utf-8")
         if "\nSECTIONS" in text and "\nTEXTS" in text:
             yield ".".join(path.relative_to(folder.parent).with_suffix("").parts)
