@@ -103,6 +103,9 @@ def timeout_warning(session: DriveSession, found: Timeout, line_text: str) -> st
     watch = found.watch
     if watch is None or watch.begun is False:
         return ""
+    if watch.begun is None and not session.arming.times:
+        # a command that only reads begins nothing: if another master began it, that one polls
+        return ""
     does = sentence(watch.reaction.does) if watch.reaction else "Its own reaction follows."
     runs = _MAY_HAVE_BEGUN if watch.begun is None else _RUNS if watch.sure else _RUNS_UNSURE
     text = runs.format(drive=who, code=watch.code, timeout=watch.timeout, reaction=does)
