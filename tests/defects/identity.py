@@ -131,7 +131,7 @@ DEFECTS = (
     Defect(
         "watch-begun-by-others-not-seen",
         "tui/session/monitor/timeout.py",
-        "return any(raws.get(chart.command) for chart in session.profile.data.charts)",
+        "return any(raws.get(code) for code in written)",
         "return False",
         "A drive that another program commanded trips after a read, without a warning.",
         (TIMEOUT,),
