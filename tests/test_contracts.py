@@ -303,7 +303,7 @@ def test_gate_runs_tests_that_the_test_command_omits() -> None:
         "drawn",
         "internal_errors",
     ]
-    layer = ".venv/bin/python -m pytest -q -n 12"
+    layer = ".venv/bin/python -m pytest -q -n 8"
     assert f"{layer} -m sweep" in README
     assert re.search(rf"^layer {layer} .*-m sweep$", CI.read_text("utf-8"), re.MULTILINE)
 

@@ -44,7 +44,7 @@ def test_broken_limit_ends_with_1_and_names_its_chapter(folder: Path) -> None:
 def test_bad_file_ends_with_2_and_its_lines(folder: Path) -> None:
     path = folder / "bad.toml"
     path.write_text(path.read_text("utf-8").replace("stub = 21", 'stub = "far"'), "utf-8")
-    assert f"{path}:22: station 1, stub: must be a number, not str" in refused(2, "plan", path)
+    assert f"{path}:22: station 1, stub: must be a number, not a text" in refused(2, "plan", path)
     assert "cannot be read" in refused(2, "plan", folder / "nosuch.toml")
     assert "--svg is for a plan" in ended(
         2, "plan", path, "--from-scan", folder / "scan.json", "--svg", folder / "p.svg"

@@ -144,7 +144,7 @@ def test_another_master_ends_the_scan_before_anything_is_sent(options: tuple[str
     assert done.exit_code == 5
     # the one received first
     assert "Address 6: " in done.stderr
-    assert "read of register 3201 to 3204" in done.stderr
+    assert "read of registers 3201 to 3204" in done.stderr
     assert "write of register 8501" in done.stderr
     assert "Nothing was sent." in done.stderr
 
@@ -161,7 +161,7 @@ def test_later_master_ends_the_scan_and_keeps_the_hits() -> None:
     with simulation, PtyPeer(script) as peer:
         done = invoked("scan", peer.path, "--addresses", "1-20", "--json")
     assert done.exit_code == 3
-    assert "Address 40: read of register 3201 to 3204" in done.stderr
+    assert "Address 40: read of registers 3201 to 3204" in done.stderr
     (end,) = events(done.stdout, "ended")
     assert (end["done"], end["found"]) == (False, 1)
     assert "1 drive found at addresses 1-20, not all of which were asked" in end["text"]
@@ -274,7 +274,7 @@ def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.MonkeyP
         done = invoked("scan", peer.path, "--addresses", "1", "--all-settings", "--json")
     (reported,) = events(done.stdout, "slow")
     assert [item["baud"] for item in reported["settings"]] == [600, 300]
-    text = "Left are 300 and 600 baud: 1 s more, for Powerdrive, Proxidrive and Varmeca 33/34 alone"
+    text = "Not searched yet: 300 and 600 baud, 1 s more, for Powerdrive, Proxidrive and Varm"
     assert text in done.stderr
     (end,) = events(done.stdout, "ended")
     assert [item["baud"] for item in end["settings"]] == [19200, 9600, 600, 300]

@@ -59,7 +59,7 @@ FAULTS: dict[str, tuple[str, str]] = {
     ),
     "text for a number": (
         step('kind = "ramp"\nhz = "50"\nup = 3'),
-        "7: step 1, hz: must be a number, not str; allowed is 0.1 to 1000.",
+        "7: step 1, hz: must be a number, not a text; allowed is 0.1 to 1000.",
     ),
     "no number": (
         step('kind = "ramp"\nhz = nan\nup = 3'),

@@ -94,8 +94,8 @@ async def test_readme_names_files_reasons_and_what_was_omitted() -> None:
     assert "half of it" in readme
     assert "missing, because:\n    [user] has it\n" in readme
     assert "broken, because:\n    by zero\n" in readme
-    assert "user names: 4 places" in readme
-    assert made.omitted == {"user names": 4}
+    assert "user names: 5 places" in readme
+    assert made.omitted == {"user names": 5}
     assert set(made.missing) == {"missing", "broken", "endless"}
 
 

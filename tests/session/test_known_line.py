@@ -156,7 +156,7 @@ def test_drive_without_identification_is_known_by_its_profile(adapters: Adapters
     assert known(on(port), SILENT, profile="powerdrive").changed == ()
     assert known(on(port), SILENT).changed == ()
     (reported,) = known(on(port), SILENT, profile="varmeca").changed
-    assert reported == "Device 5 was powerdrive, and is varmeca now."
+    assert reported == "Device 5 was Powerdrive, and is Varmeca 33/34 now."
 
 
 def test_incomplete_identity_does_not_replace_the_stored_one(adapters: Adapters) -> None:

@@ -84,18 +84,24 @@ def test_file_is_beside_the_profiles(monkeypatch: pytest.MonkeyPatch, tmp_path: 
 @pytest.mark.parametrize(
     ("row", "fault"),
     [
-        ("bad = 5", "3: lines.bad: a LINE in quotes"),
+        ("bad = 5", "3: lines.bad: expected a LINE in quotes"),
         ('COM3 = "tcp:x"', "3: lines.COM3: a name is"),
         ('factory = "tcp:x"', "3: lines.factory: a name is"),
         ('"with space" = "tcp:x"', "3: lines.with space: a name is"),
-        ('PUMP = "tcp:x"', "3: lines.PUMP: pump is this name already"),
-        ('bad = "pump"', "3: lines.bad: `line` has to be a LINE"),
+        ('PUMP = "tcp:x"', "3: lines.PUMP: pump has this name already"),
+        ('bad = "pump"', "3: lines.bad: 'pump' is not a LINE."),
         ('bad = { line = "tcp:x", adress = 3 }', "3: lines.bad.adress: only line, device, profile"),
-        ('bad = { line = "tcp:x", device = "5" }', "3: lines.bad.device: a slave address"),
-        ('bad = { line = "tcp:x", device = 248 }', "3: lines.bad.device: a slave address"),
-        ('bad = { line = "tcp:x", device = true }', "3: lines.bad.device: a slave address"),
-        ('bad = { line = "tcp:x", profile = 3 }', "3: lines.bad.profile: the id of a profile"),
-        ("bad = { device = 3 }", "3: lines.bad: `line` has to be a LINE"),
+        ('bad = { line = "tcp:x", device = "5" }', "3: lines.bad.device: expected"),
+        ('bad = { line = "tcp:x", device = 248 }', "3: lines.bad.device: expected"),
+        (
+            'bad = { line = "tcp:x", device = true }',
+            "3: lines.bad.device: expected",
+        ),
+        (
+            'bad = { line = "tcp:x", profile = 3 }',
+            "3: lines.bad.profile: expected the id",
+        ),
+        ("bad = { device = 3 }", "3: lines.bad: expected a LINE in quotes"),
         ("[line]", "3: line: only a table [lines]"),
     ],
 )

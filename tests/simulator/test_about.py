@@ -78,11 +78,11 @@ def test_raw_250_of_15_07_is_25_s() -> None:
     assert played.drive.fault is not None
 
 
-def test_timeout_of_an_altivar_312_is_accepted_up_to_30_s() -> None:
+def test_timeout_of_an_altivar_312_is_accepted_up_to_10_s() -> None:
     played = Exchange("atv312")
     played.play("""
-        > 02 06 1775 012C
-        < 02 06 1775 012C
-        > 02 06 1775 012D
+        > 02 06 1775 0064
+        < 02 06 1775 0064
+        > 02 06 1775 0065
         < 02 86 03
     """)

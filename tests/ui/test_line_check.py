@@ -81,7 +81,7 @@ async def test_changed_drive_is_read_only_until_confirmed(
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         assert app.chosen is not None
         await pilot.press("a")
-        await until(pilot, lambda: "Nothing is written to this line" in shown(app, "said"))
+        await until(pilot, lambda: "only stops are written" in shown(app, "said"))
         assert app.chosen.session.arming.armed_for is None
         # a stop needs no answer
         await pilot.press("space")

@@ -99,8 +99,8 @@ async def test_slow_setting_is_reported_before_it_is_tried(monkeypatch: pytest.M
         async with panel_on(peer.path) as (app, pilot):
             app.connection.form.offer_addresses("1-3")
             app.connection.action_scan_settings()
-            await until(pilot, lambda: "Left are 300 and 600 baud: " in output(app))
-            assert "for Powerdrive, Proxidrive and Varmeca 33/34 alone. Esc ends" in output(app)
+            await until(pilot, lambda: "Not searched yet: 300 and 600 baud, " in output(app))
+            assert "for Powerdrive, Proxidrive and Varmeca 33/34 only. Press Esc" in output(app)
             await until(pilot, lambda: "600 8E1, 2 of 3 settings. 3 s left." in advice(app))
             app.connection.action_stop_scan()
 
@@ -162,7 +162,7 @@ async def test_another_master_ends_the_scan_before_sending() -> None:
             app.connection.action_scan_settings()
             await until(pilot, lambda: "Listening" in app.connection._advice[0])
             peer.send(read_frame(6, 3201, 4))
-            await until(pilot, lambda: "Address 6: read of register 3201" in output(app))
+            await until(pilot, lambda: "Address 6: read of registers 3201" in output(app))
             assert len(peer.requests) == sent
 
 
@@ -172,7 +172,7 @@ async def test_scan_of_a_port_monitors_first() -> None:
         async with app.run_test(size=(80, 24)) as pilot:
             await until(pilot, lambda: "Listening" in app.connection._advice[0])
             peer.send(read_frame(6, 3201, 4))
-            await until(pilot, lambda: "Address 6: read of register 3201" in output(app))
+            await until(pilot, lambda: "Address 6: read of registers 3201" in output(app))
             assert not app.connection.scanning
             assert peer.requests == []
 

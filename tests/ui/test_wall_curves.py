@@ -151,9 +151,9 @@ def test_row_of_a_tripped_drive_has_the_time_since_the_trip() -> None:
     fleet.line_watch.tripped_at = WALL - 200  # type: ignore[attr-defined]
     fleet.alarms.take(fleet.line_watch.states, fleet.line_watch.onsets.by_device)
     row = rows_of(fleet, fakes.NOW, connected=True, wall=WALL)[3]
-    assert (row.words, row.brief) == ("FAULT ObF", "3 m")
+    assert (row.words, row.brief) == ("FAULT ObF", "3 min")
     text = wall_line(row, columns_for(79)).plain
-    assert "3 m · overbraking" in text
+    assert "3 min · overbraking" in text
 
 
 def test_checks_of_the_line_watch_are_points_of_the_trend() -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
-from tui.drive.sentences import sentence
+from tui.drive.sentences import sentence, without_stop
 
 from .causes import (
     KnownValues,
@@ -192,10 +192,10 @@ def hint_markdown(
     lines = []
     if left.probable:
         lines.append(f"- Probably ({TRUST[left.confidence]}): {_joined(left.probable)}")
-    lines += [f"- {known.text.rstrip('.')}: {known.reason}." for known in left.supported]
+    lines += [f"- {without_stop(known.text)}: {known.reason}." for known in left.supported]
     if left.check:
         lines.append(f"- Check (general practice): {_joined(left.check)}")
-    lines += [f"- {advice.text.rstrip('.')}: {advice.reason}." for advice in left.excluded]
+    lines += [f"- {without_stop(advice.text)}: {advice.reason}." for advice in left.excluded]
     lines += [
         f"- Check {look.code}, {profile[look.code].name}: {value(look.code)} ({look.why})"
         for look in hint.look_at

@@ -19,6 +19,11 @@ def first_of(items: Sequence[str], most: int, separator: str = ", ") -> str:
     return f"{shown} and {more} more" if more > 0 else shown
 
 
+def without_stop(text: str) -> str:
+    """Return a text without its full stop, so that more can follow it."""
+    return text.removesuffix(".")
+
+
 def sentence(text: str) -> str:
     """Return a text of a profile or a file with exactly one full stop at its end."""
     return f"{text.rstrip('.')}."

@@ -21,6 +21,7 @@ from tui.drive.hints import (
     reset_text,
 )
 from tui.drive.profile.schema import FaultHelp, Hint
+from tui.drive.sentences import without_stop
 from tui.session.reading import Reading, with_text
 from tui.session.shown import Quality
 
@@ -229,7 +230,7 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
         probably = f"{causes} ({TRUST[left.confidence]})" if causes else ALL_RULED_OUT
         rows.append(("  probably", f"{found.alarm}: {probably}" if found.alarm else probably))
         rows += [
-            ("  supported", f"{advice.text.rstrip('.')}: {advice.reason}")
+            ("  supported", f"{without_stop(advice.text)}: {advice.reason}")
             for advice in left.supported
         ]
         if left.check:
@@ -237,7 +238,7 @@ def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
         rows += [
             (
                 "  not needed" if advice.text not in hint.probable else "  ruled out",
-                f"{advice.text.rstrip('.')}: {advice.reason.removeprefix('ruled out, ')}",
+                f"{without_stop(advice.text)}: {advice.reason.removeprefix('ruled out, ')}",
             )
             for advice in left.excluded
         ]

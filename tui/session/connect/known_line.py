@@ -100,7 +100,7 @@ class KnownLine:
         differs."""
         others = {key: text for key, text in self._changed.items() if key != what}
         self._changed = {**others, what: reported} if reported and not self._accepts else others
-        reason = f"{self.text} Until you confirm, only stops are written. {self.way}"
+        reason = f"Until you confirm, only stops are written. {self.text} {self.way}"
         self._line.held = reason if self._changed else ""
 
     def _adapter_changed(self, memory: LinesMemory) -> str:

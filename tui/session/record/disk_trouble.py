@@ -28,7 +28,7 @@ _TRIED_BYTES = 1 << 16
 
 
 class InternalFault(OSError):
-    """Internal error of the recorder, which is no error of a disk."""
+    """Internal error of the recorder, not an error of the disk."""
 
 
 def disk_words(error: OSError) -> str:
@@ -38,17 +38,15 @@ def disk_words(error: OSError) -> str:
     return _WORDS.get(error.errno or 0) or error.strerror or str(error)
 
 
-def unrecorded_text(why: str, folder: Path | None, rows: int) -> str:
-    """Return the message that nothing is recorded; `folder` is None for an internal error.
-
-    `rows` is how many wait in memory at most.
-    """
+def unrecorded_text(error: OSError, folder: Path, rows: int) -> str:
+    """Return the message that nothing is recorded; `rows` is how many wait in memory at most."""
+    why, internal = disk_words(error), isinstance(error, InternalFault)
     text = (
-        f"Nothing is recorded: {why if folder is None else f'{why}: {folder}'}."
+        f"Nothing is recorded: {why if internal else f'{why}: {folder}'}."
         f" Up to {rows:,} rows wait in memory, further ones are lost."
         " Drives are polled and stopped as before."
     )
-    if folder is None:
+    if internal:
         return f"{text} Recording is tried again automatically."
     return f"{text} Recording goes on when the folder can be written."
 

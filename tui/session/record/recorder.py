@@ -377,9 +377,7 @@ class LineRecorder:
             with suppress(OSError):
                 self._set_aside(error)
         if first:
-            internal = isinstance(error, InternalFault)
-            folder = None if internal else self._folder
-            self._tell(unrecorded_text(self._why, folder, RECORD_BACKLOG))
+            self._tell(unrecorded_text(error, self._folder, RECORD_BACKLOG))
 
     def _tell(self, text: str) -> None:
         log.warning("%s", text)
