@@ -53,7 +53,7 @@ def test_map_shows_channels_words_references_and_scanner() -> None:
     assert rows["Command"] == MapRow("Command", "Modbus", "CMD 16#000F")
     assert rows["Reference"] == MapRow("Reference", "Modbus", "LFR 40.0 Hz")
     assert rows["ETA"].text == "16#0637"
-    assert "Operation enabled" in rows["ETA"].detail
+    assert rows["ETA"].detail == "ready, switched on, enabled, power, at reference"
     assert rows["LFRD"].text == "1200 rpm"
     [scanner] = [row for row in rows.values() if "NM1 ETA 16#0637" in row.text]
     assert scanner.text == "NM1 ETA 16#0637"

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
-from tui.drive.bit_texts import bit_texts
+from tui.drive.bit_texts import short_bit, true_bits
 from tui.drive.blocks.user_words import FORMATS, UserWord, UserWords
 from tui.drive.communication_words import communication_words
 from tui.drive.profile.schema import Block
@@ -111,8 +111,10 @@ class CommunicationMap:
 
     def _bits(self, code: str) -> str:
         raw = self._raws.get(code)
-        bits = self.console.session.profile[code].bits
-        return "" if raw is None else ", ".join(bit_texts(bits, raw))
+        if raw is None:
+            return ""
+        bits = true_bits(self.console.session.profile[code].bits, raw)
+        return ", ".join(filter(None, (short_bit(bit, on=on) for bit, on in bits)))
 
     # Words of a person's choice, which Scanner shows too
 
