@@ -103,6 +103,10 @@ FAULTS: dict[str, tuple[str, str]] = {
         step('kind = "speeds"\nhz = 50\nlimits = { motor_voltage = { max = 400, unit = "V" } }'),
         "8: step 1, limits: 'motor_voltage' is not a value of Altivar 312. It has output_freq",
     ),
+    "impossible unit": (
+        step('kind = "speeds"\nhz = 50\nlimits = { motor_current = { max = 4, unit = "kW" } }'),
+        "8: step 1, limits: motor_current is in A here, not in 'kW'",
+    ),
     "no unit": (
         step('kind = "speeds"\nhz = 50\nlimits = { motor_current = { max = 4 } }'),
         "8: step 1, limits, motor_current: the field `unit` is missing: ",

@@ -110,7 +110,7 @@ def counters(
                 say_row(COUNTER_TITLES, (title, text))
             for difference in found.differences:
                 say(difference.text)
-            if found.agree and not found.trouble:
+            if found.agree:
                 say(found.agreeing)
         if watch.trouble:
             return DRIVE_REFUSED if watch.is_refused else LINE_TROUBLE

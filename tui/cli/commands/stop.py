@@ -177,7 +177,7 @@ async def _stop_one(wish: StopWish, device: int) -> tuple[int, DriveSession]:
 async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish) -> int:
     """Stop a drive, report the result; returns the exit status."""
     from tui.session.command.motor_stop import with_other_way
-    from tui.session.command.stop_report import MAY_COAST, Phase
+    from tui.session.command.stop_report import Phase
 
     session, order, telling = found.session, wish.order, wish.telling
     # a drive without the requested kind of stop gets the ramp stop, and the result says so
@@ -190,10 +190,9 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, wish: StopWish)
     if telling.as_json:
         await PolledDrive(session, "", goes_on=True).learn()
     if report.phase is Phase.STOPPED:
-        may_coast = report.text.startswith(MAY_COAST)
         text = f"{who}: {with_other_way(report.text, order, way)}."
-        telling.stopped(session, text, may_coast=may_coast)
-        if not may_coast:
+        telling.stopped(session, text, may_coast=report.may_coast)
+        if not report.may_coast:
             await asyncio.to_thread(forget_start, session)
         return 0
     status = await status_of_failed(session)

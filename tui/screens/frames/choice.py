@@ -19,15 +19,8 @@ from tui.session.listening.words import FUNCTION_NAMES
 from tui.wire.frames import BIT_READS, COIL_ON, SPACES, Pdu, bits_of, pdu_of
 from tui.wire.observed.pairing import BROADCAST_DEVICE
 
-READ_COILS, READ_INPUTS, READ, WRITE_COIL, WRITE_ONE, WRITE_COILS, WRITE_MANY = (
-    1,
-    2,
-    3,
-    5,
-    6,
-    15,
-    16,
-)
+READ_COILS, READ_INPUTS, READ = 1, 2, 3
+WRITE_COIL, WRITE_ONE, WRITE_COILS, WRITE_MANY = 5, 6, 15, 16
 READ_WRITE = 23
 EXCEPTION_BIT = 0x80
 CODES_OF_FRAME = 3

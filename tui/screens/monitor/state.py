@@ -12,7 +12,7 @@ from tui.drive.profile.schema import Quantity
 from tui.drive.sentences import uncapitalized
 from tui.drive.values import NOT_AVAILABLE
 from tui.safety import WARNED_AT_SHARE
-from tui.session.command.stop_report import MAY_COAST, NOT_STOPPED, NOT_STOPPING, Phase, StopReport
+from tui.session.command.stop_report import NOT_STOPPED, NOT_STOPPING, Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.monitor.line_health import LEAST_REPLIES, POOR
 from tui.widgets.drawing import short, wrapped
@@ -94,9 +94,8 @@ def _stop(report: StopReport, width: int) -> tuple[Text, list[Text]]:
     words, style = HEADS[report.phase]
     text = report.text.removeprefix(NOT_STOPPED)
     if report.phase is Phase.STOPPED:
-        coasts = text.startswith(MAY_COAST)
-        words = "NO CURRENT" if coasts else words
-        text = "The motor may still coast." if coasts else "by the stop key"
+        words = "NO CURRENT" if report.may_coast else words
+        text = "The motor may still coast." if report.may_coast else "by the stop key"
     most = MORE_ROWS if report.phase in NOT_STOPPING else 2
     return Text(words, style), [Text(line, PLAIN) for line in wrapped(text, width, most)]
 

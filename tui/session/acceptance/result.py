@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from tui.drive.sentences import without_stop
 from tui.drive.settings.parameter_set import ParameterSet
 
 from .curve import RunCurve
@@ -27,8 +28,7 @@ class LimitCheck:
     @property
     def text(self) -> str:
         """The comparison as a sentence."""
-        value = self.value.removesuffix(".")
-        return f"{self.name}: {value}, allowed: {self.limit}."
+        return f"{self.name}: {without_stop(self.value)}, allowed: {self.limit}."
 
 
 @dataclass(slots=True)

@@ -13,9 +13,9 @@ from tui.drive.profile.converting import converted
 from tui.drive.profile.form import form_faults
 from tui.drive.profile.person_file import raise_faults, read_person_file
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Quantity
+from tui.drive.profile.schema import Parameter, Quantity
 from tui.drive.profile.toml_lines import TomlPath
-from tui.drive.sentences import any_of
+from tui.drive.sentences import any_of, without_stop
 from tui.drive.settings.parameter_set import ParameterSet, SetError
 from tui.drive.settings.set_file import read_set
 from tui.drive.units import factor_between
@@ -102,7 +102,7 @@ class _Checked:
         try:
             profile = library.load(test.profile)
         except DriveError as error:
-            self.faults.append((("profile",), str(error).rstrip(".")))
+            self.faults.append((("profile",), without_stop(str(error))))
             self._raise()
             raise
         sets: dict[int, ParameterSet] = {}
@@ -141,7 +141,7 @@ class _Checked:
         try:
             found = read_set(self.path.parent / name)
         except (SetError, DriveError) as error:
-            self.faults.append((place, str(error).rstrip(".")))
+            self.faults.append((place, without_stop(str(error))))
             return
         if found.head.profile != profile.id:
             text = f"{name} is a set of {found.head.profile}, not of {profile.id}"
@@ -176,10 +176,13 @@ def step_faults(step: AcceptanceStep, profile: Profile) -> Iterator[tuple[str, s
 
 
 def _limit_faults(step: SpeedsStep, profile: Profile) -> Iterator[str]:
-    known = {q: parameter for q in MEASURED if (parameter := profile.quantity(q)) is not None}
+    known: dict[str, Parameter] = {
+        quantity: parameter
+        for quantity in MEASURED
+        if (parameter := profile.quantity(quantity)) is not None
+    }
     for name, limits in step.limits.items():
-        parameter = next((known[q] for q in known if q == name), None)
-        if parameter is None:
+        if (parameter := known.get(name)) is None:
             yield f"{name!r} is not a value of {profile.name}. It has {any_of(list(known))}"
             continue
         unit = parameter.unit

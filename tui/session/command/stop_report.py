@@ -79,6 +79,11 @@ class StopReport(NamedTuple):
     time: float
     since: float
 
+    @property
+    def may_coast(self) -> bool:
+        """True if the drive is stopped, but nothing brakes its motor, which may still turn."""
+        return self.phase is Phase.STOPPED and self.text.startswith(MAY_COAST)
+
 
 def as_seen(
     report: StopReport,

@@ -140,7 +140,7 @@ def reach_line(sight: DiagnosticEvidence) -> Iterator[str]:
     if isinstance(sight.link, SerialLink):
         yield "Check the adapter's plug; the line reopens automatically."
         return
-    yield "Look at the gateway's supply and cable, its address, and the port that it listens on."
+    yield "Check the gateway's supply and cable, its address, and the port that it listens on."
 
 
 def wait(sight: DiagnosticEvidence) -> Iterator[str]:
@@ -217,7 +217,7 @@ def end_damage(sight: DiagnosticEvidence) -> Iterator[str]:
     if sight.broken:
         yield "A format that differs by its parity or stop bits breaks some characters only."
         yield from settings_hints(sight)
-    yield "Look at shield and routing, polarization, termination at both ends alone, taps."
+    yield "Check shield and routing, polarization, termination at both ends only, taps."
     yield "Two drives at one address, or a second master, break answers too."
     yield from wiring_hints(sight, answers=True)
 
@@ -274,7 +274,7 @@ def one_master(sight: DiagnosticEvidence) -> Iterator[str]:
 def find_sender(sight: DiagnosticEvidence) -> Iterator[str]:
     """Steps if bytes arrived before the first request, but no frame."""
     yield "Run drivepanel listen: a master sends again and again, noise at random."
-    yield "Look at the polarization: without it, an idle line picks up noise."
+    yield "Check the polarization: without it, an idle line picks up noise."
     yield from wiring_hints(sight)
 
 
@@ -329,7 +329,7 @@ def end_copies(_sight: DiagnosticEvidence) -> Iterator[str]:
 
 def end_strays(sight: DiagnosticEvidence) -> Iterator[str]:
     """Steps if bytes without a frame arrive beside intact replies."""
-    yield "Look at polarization, and termination at both ends alone: an idle line picks up noise."
+    yield "Check polarization, and termination at both ends only: an idle line picks up noise."
     yield from wiring_hints(sight, answers=True)
 
 

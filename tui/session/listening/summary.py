@@ -10,7 +10,7 @@ from tui.bus.limits import STANDARD_EXCEPTIONS
 from tui.drive.errors import DriveError
 from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
-from tui.drive.sentences import any_of, counted, first_of
+from tui.drive.sentences import any_of, counted, first_of, without_stop
 from tui.drive.shown import number_of
 
 from . import summary_texts as texts
@@ -193,7 +193,7 @@ def feeding_text(feeding: Feeding) -> str:
 def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str]:
     tally = drive.tally
     for code, times in sorted(tally.exceptions.items()):
-        meaning = exception_meaning(code, profile).removesuffix(".")
+        meaning = without_stop(exception_meaning(code, profile))
         yield counted(times, *texts.REFUSED_TIMES_TEXTS, code=code, meaning=meaning)
     if tally.answers["none"] and not drive.silent:
         yield counted(tally.answers["none"], "no answer once", "no answer {count} times")
