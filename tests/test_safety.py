@@ -440,7 +440,7 @@ async def test_stop_shows_an_effect_in_1_5_seconds_and_is_followed_for_a_minute(
     monkeypatch.setattr(motor_stop, "run_by_others", lambda _: "")
     stop = SimpleNamespace(
         reader=None, session=SimpleNamespace(clock=now), ordered=1000.0, _motion=moves,
-        say=lambda *_: None, _with_way=str, _why_not=lambda _: "it turns",
+        _tell=lambda *_: None, _with_way=str, _why_not=lambda _: "it turns",
     )  # fmt: skip
     order = cast(Any, SimpleNamespace(name="ramp"))
     assert await motor_stop.MotorStop._follow(cast(Any, stop), cast(Any, None), order)

@@ -313,6 +313,15 @@ async def test_motor_that_a_halt_has_stopped_gets_the_word_that_ends_operation(
     assert here.session.full_reads_requested > 0
 
 
+async def test_stop_that_another_has_replaced_reports_nothing_more(journal: Journal) -> None:
+    """Its acknowledgment may arrive after the reports of the other one."""
+    here = stop_of_71(journal, CHCF=1)
+    here.stop.over = True
+    await here.stop._send(*await here.stop._chosen())
+    assert here.written == [0x10F]
+    assert here.reports == []
+
+
 Moves = list[tuple[str, float | None]]
 
 

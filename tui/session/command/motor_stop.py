@@ -148,14 +148,14 @@ class MotorStop:
             return "it took no stop word." if first.answered else "it did not answer."
         session.image.distrust()
         self.taken = True
-        self.say(session, Phase.FAILED, not_proved(), self.ordered)
+        self._tell(Phase.FAILED, not_proved())
         return None
 
     async def follow(self) -> str | None:
         """Follow a motor whose stop was sent in another way; return why it does not stop."""
         self.begun = self.sent = True
         if unlike_families(self.session):
-            self.say(self.session, Phase.FAILED, not_proved(), self.ordered)
+            self._tell(Phase.FAILED, not_proved())
             return None
         return await self._follow(*await self._chosen())
 
@@ -249,7 +249,7 @@ class MotorStop:
         """Report that the words were sent, unless another source is known to run the motor."""
         self.sent = True
         if not self._unheeded:
-            self.say(self.session, Phase.STOPPING, order.name, self.ordered)
+            self._tell(Phase.STOPPING, order.name)
 
     def tell_silent(self) -> None:
         """Report a drive that has answered nothing for a while: its stop is still repeated."""
@@ -259,9 +259,14 @@ class MotorStop:
         if clock.monotonic() - since > TAKES_EFFECT:
             self._tell_unheeded(DOES_NOT_ANSWER.format(device=session.device))
 
+    def _tell(self, phase: Phase, text: str) -> None:
+        """Report progress, unless another stop has replaced this one and reports its own."""
+        if not self.over:
+            self.say(self.session, phase, text, self.ordered)
+
     def _tell_unheeded(self, why: str) -> None:
         self._unheeded = True
-        self.say(self.session, Phase.UNHEEDED, not_stopped(why), self.ordered)
+        self._tell(Phase.UNHEEDED, not_stopped(why))
 
     async def _follow(self, chart: Chart, order: Order) -> str | None:
         """Follow the motor to standstill; return why it does not stop, or None."""
@@ -296,7 +301,7 @@ class MotorStop:
                 continue
             self._unheeded = False
             what = f"{order.name}, {hertz:g} Hz" if hertz else order.name
-            self.say(self.session, Phase.STOPPING, self._with_way(what), self.ordered)
+            self._tell(Phase.STOPPING, self._with_way(what))
             await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
         return STANDSTILL_UNKNOWN if unknown else STILL_TURNS
 
@@ -307,7 +312,7 @@ class MotorStop:
         """
         session = self.session
         if session.guessed:
-            self.say(session, Phase.FAILED, not_proved(session.profile.name), self.ordered)
+            self._tell(Phase.FAILED, not_proved(session.profile.name))
         else:
             turned = self._turned if before is None else before != 0
             # not known: it may turn when it is left to coast; a fault may be an old one
@@ -315,7 +320,7 @@ class MotorStop:
                 turned is not False if self.order == "freewheel" else kind == "fault" and turned
             )
             text = MAY_COAST if coasts else "stopped"
-            self.say(session, Phase.STOPPED, self._with_way(text), self.ordered)
+            self._tell(Phase.STOPPED, self._with_way(text))
 
     def _with_way(self, progress: str) -> str:
         return with_other_way(progress, self.wanted, self.order)
