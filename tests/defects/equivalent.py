@@ -22,12 +22,9 @@ EQUIVALENT: dict[str, str] = {
     "tui/bus/schedule/queue.py:LineShares.come: return: return -> pass": (
         "Kinds without a minimum share are counted no time, so that each program has had none."
     ),
-    "tui/drive/read_plan.py:run_length: constant: 0 -> 1": (
-        "A run of one parameter has returned by then, and all of a run have the same function."
-    ),
-    "tui/drive/read_plan.py:_cheapest: boundary: last - ordered[start].address >= longest ->"
-    " (last - ordered[start].address > longest)": (
-        "The read that is looked at in addition is too long, and `run_length` refuses it."
+    "tui/drive/read_plan.py:_cheapest: boundary: last - first.address >= longest -> (last -"
+    " first.address > longest)": (
+        "The read that is looked at in addition is too long, and `_is_allowed` refuses it."
     ),
     "tui/drive/read_plan.py:_cheapest: constant: 0 -> 1": (
         "The first entry is of no parameters: where its last run begins is not read."
@@ -81,16 +78,16 @@ EQUIVALENT: dict[str, str] = {
         "It is added to the time of each choice alike."
     ),
     "tui/drive/read_plan.py:_cheapest: constant: 1 -> 2 #3": (
-        "Reads that are too long are looked at in addition, and `run_length` refuses them."
+        "Reads that are too long are looked at in addition, and `_is_allowed` refuses them."
     ),
     "tui/drive/read_plan.py:_cheapest: boundary: start < end - 1 -> (start <= end - 1)": (
         "A run of one parameter is no words long, which is never the most."
     ),
     "tui/drive/read_plan.py:_cheapest: constant: 1 -> 10 #4": (
-        "Reads that are too long are looked at in addition, and `run_length` refuses them."
+        "Reads that are too long are looked at in addition, and `_is_allowed` refuses them."
     ),
     "tui/drive/read_plan.py:_cheapest: constant: 1 -> 2 #4": (
-        "Reads that are too long are looked at in addition, and `run_length` refuses them."
+        "Reads that are too long are looked at in addition, and `_is_allowed` refuses them."
     ),
     "tui/drive/words.py:to_words: constant: 0 -> 1": ("The value replaces all bits of its word."),
     "tui/drive/values.py:engineering: boundary: -int(scale.as_tuple().exponent) > decimals ->"

@@ -262,13 +262,17 @@ def _cheapest(
     """Return, for each prefix of `ordered`, its least time in seconds and the last run's start."""
     best: list[tuple[float, int]] = [(0.0, 0)]
     longest = _longest(profile, ordered[0])
+    known_to: dict[int, int] = {}
     for end in range(1, len(ordered) + 1):
-        last = ordered[end - 1].address
+        last, stop = ordered[end - 1].address, 0
         choices = []
         for start in reversed(range(end)):
-            if start < end - 1 and last - ordered[start].address >= longest:
+            first = ordered[start]
+            if start < end - 1 and last - first.address >= longest:
                 break  # too long, as is every read that begins earlier
-            if (count := run_length(profile, ordered[start:end], unreadable)) is not None:
+            stop = max(stop, first.address + word_count(first))
+            count = stop - first.address
+            if start == end - 1 or _is_allowed(profile, first, count, unreadable, known_to):
                 choices.append((best[start][0] + timing.read(count), start))
         best.append(min(choices))
     return best
@@ -291,26 +295,44 @@ def request_of(run: Sequence[Parameter]) -> ReadRequest:
     return ReadRequest(first, _span(run), places, run[0].function)
 
 
-def run_length(
-    profile: Profile, run: Sequence[Parameter], unreadable: Collection[str] = ()
-) -> int | None:
+def run_length(profile: Profile, run: Sequence[Parameter]) -> int | None:
     """Return the number of words of a read over this run; None if the drive does not allow it."""
     count = _span(run)
-    if len(run) == 1 or count == 1:
-        return count
+    return count if len(run) == 1 or _is_allowed(profile, run[0], count, (), {}) else None
+
+
+def _is_allowed(
+    profile: Profile,
+    first: Parameter,
+    count: int,
+    unreadable: Collection[str],
+    known_to: dict[int, int],
+) -> bool:
+    """Return True if the drive allows a read of several parameters in so many words."""
+    if count == 1:
+        return True
     reading = profile.data.reading
-    if reading.single_words_only or count > _longest(profile, run[0]):
-        return None
-    if not reading.gaps_readable and not _all_known(profile, run[0], count, unreadable):
-        return None
-    return count
+    if reading.single_words_only or count > _longest(profile, first):
+        return False
+    end = first.address + count
+    return reading.gaps_readable or _known_to(profile, first, unreadable, known_to) >= end
 
 
-def _all_known(profile: Profile, first: Parameter, count: int, unreadable: Collection[str]) -> bool:
-    at = first.address
-    while at < first.address + count:
+def _known_to(
+    profile: Profile, first: Parameter, unreadable: Collection[str], found: dict[int, int]
+) -> int:
+    """Return the first address from a parameter on that cannot be read.
+
+    `found` holds the results of this function for earlier parameters in the same space.
+    """
+    passed, at = [], first.address
+    while at not in found:
         parameter = profile.at(at, first.function)
         if parameter is None or parameter.access == "w" or parameter.code in unreadable:
-            return False
-        at += word_count(parameter)
-    return True
+            found[at] = at
+        else:
+            passed.append(at)
+            at += word_count(parameter)
+    end = found[at]
+    found.update(dict.fromkeys(passed, end))
+    return end

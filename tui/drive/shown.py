@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 from decimal import Decimal
+from functools import lru_cache
 
 from msgspec import structs
 
@@ -124,6 +125,7 @@ def number_of(
     return engineering(raw, scale, parameter.offset)
 
 
+@lru_cache(maxsize=32)  # asked for once a row of a table of settings
 def scale_sources(profile: Profile) -> frozenset[str]:
     """Return the codes of the parameters that other parameters' scales depend on."""
     return frozenset(p.scale_source for p in profile.parameters if p.scale_source)

@@ -11,6 +11,8 @@ from .errors import ValueRefused, ValueUndetermined
 from .plain import plain
 from .profile.schema import Parameter
 
+TWO_WORDS = frozenset({"uint32", "int32", "float32"})
+"""Types of two registers."""
 NOT_A_NUMBER = -(1 << 31)
 """Raw value of a float without a number, or outside the counts of its resolution."""
 
@@ -42,7 +44,7 @@ def word_count(parameter: Parameter) -> int:
     """
     if parameter.type == "ascii" or parameter.is_bits:
         return parameter.words
-    return 2 if parameter.type.endswith("32") else 1
+    return 2 if parameter.type in TWO_WORDS else 1
 
 
 def from_words(parameter: Parameter, words: Sequence[int]) -> int:
