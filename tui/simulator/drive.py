@@ -6,9 +6,9 @@ Several threads may request and step a drive; each public method holds its lock.
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from functools import partial
+from functools import lru_cache, partial
 from random import Random
 
 from tui.drive.profile.profile import Profile
@@ -21,10 +21,20 @@ from .plant.fault_history import fault_raw
 from .plant.first_values import first_values, model_words
 from .plant.memory import SettingsMemory
 from .plant.monitoring import show_motor
-from .plant.motor import Load, MotorDemand, MotorState, Shaft, Stop, Wanderer, rating_of, step
+from .plant.motor import (
+    Load,
+    MotorDemand,
+    MotorState,
+    RatingPlate,
+    Shaft,
+    Stop,
+    Wanderer,
+    rating_of,
+    step,
+)
 from .plant.terminals import BY_KIND, COMPACT, Terminals
 from .plant.watch import SilenceWatch
-from .registers import Registers, typed_raw
+from .registers import Registers, register_map, typed_raw
 from .rules import traits_of
 from .server.access import DriveWords
 from .server.answering import Answering, Station
@@ -34,6 +44,16 @@ from .tripping import Tripping
 
 WATCH_STARTERS = frozenset({"command_word", "command_frequency", "command_speed"})
 """Quantities whose write starts the timeout of a drive that waits for a first command."""
+
+
+@lru_cache(maxsize=32)  # thirty drives of one kind on a line begin alike
+def first_words(profile: Profile, rating: RatingPlate) -> tuple[Mapping[int, int], ...]:
+    """Return the words of a drive set up for its line, and of one at its factory settings."""
+    places = register_map(profile)
+    return tuple(
+        places.words(profile, first_values(profile, rating, chosen))
+        for chosen in (traits_of(profile).first_values, {})
+    )
 
 
 class SimulatedDrive:
@@ -56,8 +76,7 @@ class SimulatedDrive:
         identification = profile.data.identification
         identity = identity_of(identification, spec.name, spec.identity)
         rating = rating_of(identity.get(1, b"").decode("ascii", "replace"))
-        initial = first_values(profile, rating, traits.first_values)
-        self.registers = Registers(profile, initial, first_values(profile, rating, {}))
+        self.registers = Registers(profile, *first_words(profile, rating))
         self.station = Station(profile, self.registers, spec.address)
         random = Random(f"{seed}/{spec.address}")
         hours = 900.0 + random.randrange(2000)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import lru_cache
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
@@ -23,6 +24,63 @@ UNKEPT_QUANTITIES = frozenset(
 """Quantities that are commands of the line: no family keeps them over a power-down."""
 
 
+class RegisterMap:
+    """What every drive of a profile has in common: which parameter is where, and which it keeps."""
+
+    def __init__(self, profile: Profile) -> None:
+        self.folded = {p.code.casefold(): p for p in profile.parameters}
+        self.whole: dict[str, tuple[int, int, int]] = {}
+        """Address and range of each parameter that is one whole word: nearly every one."""
+        self.fields: dict[int, int] = {}
+        """Bits of a whole word that are parameters of their own, by address."""
+        self.owner: dict[int, Parameter] = {}
+        self.copies: dict[int, int] = {}
+        """Addresses in RAM, by those of their copies in EEPROM."""
+        for parameter in profile.parameters:
+            addresses = _addresses(parameter)
+            if is_field(parameter):
+                bits = parameter.mask << parameter.shift & 0xFFFF
+                self.fields[addresses[0]] = self.fields.get(addresses[0], 0) | bits
+            elif len(addresses) == 1:
+                self.whole[parameter.code] = (addresses[0], *type_range(parameter))
+            for address in addresses:
+                self.owner.setdefault(address, parameter)
+            if parameter.eeprom_address is not None:
+                for place, address in enumerate(addresses):
+                    self.copies[parameter.eeprom_address + place] = address
+        self.owner |= {copy: self.owner[address] for copy, address in self.copies.items()}
+        self.own = {address for address, p in self.owner.items() if p.access == "r"}
+        self.volatile = {address for address, p in self.owner.items() if is_volatile(p)}
+
+    def store(self, parameter: Parameter, raw: int, *memories: dict[int, int]) -> None:
+        """Put a raw value, limited to its type, into words by address."""
+        if (whole := self.whole.get(parameter.code)) is not None:
+            # the drive shows about twenty values at each time step
+            address, low, high = whole
+            word = min(max(raw, low), high) & 0xFFFF
+            if (fields := self.fields.get(address)) is not None:
+                word = word & ~fields | memories[0].get(address, 0) & fields
+            for words in memories:
+                words[address] = word
+            return
+        low, high = type_range(parameter)
+        for words in memories:
+            _put_words(words, parameter, min(max(raw, low), high))
+
+    def words(self, profile: Profile, raws: Mapping[str, int]) -> dict[int, int]:
+        """Return the words of all parameters, from their raw values by code."""
+        words: dict[int, int] = {}
+        for parameter in profile.parameters:
+            self.store(parameter, raws[parameter.code], words)
+        return words
+
+
+@lru_cache(maxsize=32)
+def register_map(profile: Profile) -> RegisterMap:
+    """Return the map of a profile; a line may have thirty drives of one."""
+    return RegisterMap(profile)
+
+
 class Registers:
     """Words by place (wire address and address space), and parameters by code.
 
@@ -32,56 +90,27 @@ class Registers:
     """
 
     def __init__(
-        self, profile: Profile, initial: Mapping[str, int], factory: Mapping[str, int]
+        self, profile: Profile, initial: Mapping[int, int], factory: Mapping[int, int]
     ) -> None:
+        """`initial` and `factory` are words by place, as `RegisterMap.words` returns them."""
         self.profile = profile
-        self._words: dict[int, int] = {}
-        self._in_force: dict[int, int] = {}
-        self._owner: dict[int, Parameter] = {}
+        self._map = register_map(profile)
+        self._words = dict(initial)
+        self._in_force = dict(initial)
+        self._factory = factory
         self._held: set[str] = set()
         self._protected: set[int] = set()
-        self._folded = {p.code.casefold(): p for p in profile.parameters}
-        self._whole = {
-            p.code: (_addresses(p)[0], *type_range(p))
-            for p in profile.parameters
-            if word_count(p) == 1 and not is_field(p)
-        }
-        """Address and range of each parameter that is one whole word: nearly every one."""
-        self._fields: dict[int, int] = {}
-        """Bits of a whole word that are parameters of their own, by address."""
-        for parameter in profile.parameters:
-            if is_field(parameter):
-                address = _addresses(parameter)[0]
-                bits = parameter.mask << parameter.shift & 0xFFFF
-                self._fields[address] = self._fields.get(address, 0) | bits
-        for parameter in profile.parameters:
-            for address in _addresses(parameter):
-                self._owner.setdefault(address, parameter)
-            self._store(parameter, initial[parameter.code])
-        self._copies = {
-            parameter.eeprom_address + place: address
-            for parameter in profile.parameters
-            if parameter.eeprom_address is not None
-            for place, address in enumerate(_addresses(parameter))
-        }
-        """Addresses in RAM, by those of their copies in EEPROM."""
-        self._owner |= {copy: self._owner[address] for copy, address in self._copies.items()}
-        self._factory: dict[int, int] = {}
-        for parameter in profile.parameters:
-            _put_words(self._factory, parameter, factory[parameter.code])
-        self._own = {address for address, p in self._owner.items() if p.access == "r"}
-        self._volatile = {address for address, p in self._owner.items() if is_volatile(p)}
-        self._saved = {a: word for a, word in self._words.items() if a not in self._own}
+        self._saved = {a: word for a, word in initial.items() if a not in self._map.own}
 
     # Access by the line
 
     def owner(self, address: int) -> Parameter | None:
         """Return the parameter of a word; None for an unknown or protected word."""
-        return None if address in self._protected else self._owner.get(address)
+        return None if address in self._protected else self._map.owner.get(address)
 
     def word(self, address: int) -> int:
         """Return the present word at a known address."""
-        copied = self._copies.get(address)
+        copied = self._map.copies.get(address)
         return self._words[address] if copied is None else self._saved[copied]
 
     def write_word(self, address: int, word: int) -> None:
@@ -89,14 +118,14 @@ class Registers:
 
         A write to the copy of a setting in EEPROM sets the one in RAM, too.
         """
-        parameter = self._owner[address]
-        if (copied := self._copies.get(address)) is not None:
+        parameter = self._map.owner[address]
+        if (copied := self._map.copies.get(address)) is not None:
             self._saved[copied] = word & 0xFFFF
             address = copied
         self._words[address] = word & 0xFFFF
         if parameter.effective == "at-once" and not self._waits(parameter):
             self._in_force[address] = word & 0xFFFF
-        if parameter.storage in ("eeprom", "unknown") and address not in self._volatile:
+        if parameter.storage in ("eeprom", "unknown") and address not in self._map.volatile:
             self._saved[address] = word & 0xFFFF
 
     def _waits(self, parameter: Parameter) -> bool:
@@ -107,7 +136,7 @@ class Registers:
 
     def named(self, code: str) -> Parameter | None:
         """Return the parameter with this code in any case, or None."""
-        return self._folded.get(code.casefold())
+        return self._map.folded.get(code.casefold())
 
     def present(self, parameter: Parameter) -> int:
         """Return the raw value that the line reads."""
@@ -115,7 +144,7 @@ class Registers:
 
     def in_force(self, parameter: Parameter) -> int:
         """Return the raw value on which the drive acts."""
-        if (whole := self._whole.get(parameter.code)) is not None:
+        if (whole := self._map.whole.get(parameter.code)) is not None:
             word = self._in_force[whole[0]]
             return word if word <= whole[2] else word - 0x10000
         return from_words(parameter, [self._in_force[a] for a in _addresses(parameter)])
@@ -144,20 +173,22 @@ class Registers:
     def save(self) -> None:
         """Copy the present words to the EEPROM, as a save command does."""
         for address, word in self._words.items():
-            if address not in self._volatile and address not in self._own:
+            if address not in self._map.volatile and address not in self._map.own:
                 self._saved[address] = word
 
     def restore(self, *, volatile_only: bool = False) -> None:
         """Replace the present words by the saved ones, as at power-up; optionally only those not
         kept."""
-        saved = {a: w for a, w in self._saved.items() if a in self._volatile or not volatile_only}
+        saved = {
+            a: w for a, w in self._saved.items() if a in self._map.volatile or not volatile_only
+        }
         self._words.update(saved)
         self._in_force.update(saved)
 
     def recall(self, keep: frozenset[str]) -> None:
         """Replace the present words by the saved ones, except those whose code is in `keep`."""
         for address, word in self._saved.items():
-            if address not in self._volatile and self._owner[address].code not in keep:
+            if address not in self._map.volatile and self._map.owner[address].code not in keep:
                 self._words[address] = self._in_force[address] = word
 
     def to_factory(self, keep: frozenset[str]) -> None:
@@ -174,17 +205,7 @@ class Registers:
             self._words[address] = self._in_force[address] = self._factory[address]
 
     def _store(self, parameter: Parameter, raw: int) -> None:
-        if (whole := self._whole.get(parameter.code)) is not None:
-            # the drive shows about twenty values at each time step
-            address, low, high = whole
-            word = min(max(raw, low), high) & 0xFFFF
-            if (fields := self._fields.get(address)) is not None:
-                word = word & ~fields | self._words.get(address, 0) & fields
-            self._words[address] = self._in_force[address] = word
-            return
-        low, high = type_range(parameter)
-        for words in (self._words, self._in_force):
-            _put_words(words, parameter, min(max(raw, low), high))
+        self._map.store(parameter, raw, self._words, self._in_force)
 
 
 def is_volatile(parameter: Parameter) -> bool:
