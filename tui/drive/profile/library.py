@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import suppress
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -40,6 +40,7 @@ class Listing(NamedTuple):
     """File with the same id that replaces this one; None if this one is used."""
 
 
+@cache
 def packaged_folder() -> Path:
     """Return the folder of the packaged profiles, in a wheel or a checkout."""
     package = Path(__file__).resolve().parents[2]
