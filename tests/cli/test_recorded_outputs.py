@@ -41,7 +41,7 @@ NOT_RUN = {"ports", "bundle", "listen"}
 """Commands whose output depends on this computer."""
 TIMED = {"watch", "scan", "counters", "why"}
 """Commands whose numbers depend on the time that they take: none is recorded."""
-BUSY = r"(, up to N ms: N)+|, N ms after each request"
+BUSY = r"(, up to N ms: N)+|, usually N ms after a request"
 """Texts of a busy computer."""
 FURTHER: tuple[tuple[str, ...], ...] = (
     ("watch", *DRIVE, "ETA", "RFR", "--every", "0.1", "--count", "2", "--csv", "FOLDER/new.csv"),

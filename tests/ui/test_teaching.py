@@ -52,7 +52,7 @@ async def two_readings(
 async def test_two_readings_set_the_scale_and_a_disagreeing_third_discards_it() -> None:
     async with bench("powerdrive") as made:
         app, pilot = made.app, made.pilot
-        assert "Output ?" in shown(app, "readouts")
+        await until(pilot, lambda: "Output ?" in shown(app, "readouts"))
         await two_readings(made, "5.01", (300, "30.0Hz"), (503, "50.3"))
         await until(pilot, lambda: "Output taught" in shown(app, "readouts"))
         await until(pilot, lambda: "Hz" in shown(app, "readouts"))
