@@ -25,7 +25,7 @@ UNKEPT_QUANTITIES = frozenset(
 
 
 class RegisterMap:
-    """What every drive of a profile has in common: which parameter is where, and which it keeps."""
+    """Places of all parameters of a profile, and those that a drive keeps."""
 
     def __init__(self, profile: Profile) -> None:
         self.folded = {p.code.casefold(): p for p in profile.parameters}
