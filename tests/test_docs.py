@@ -178,6 +178,7 @@ def test_documents_name_existing_things_only() -> None:
     assert {name: reported for name, reported in found.items() if reported} == {}
 
 
+@pytest.mark.sweep  # with the test above, which reads the whole source, too
 def test_wrong_names_fail_the_check() -> None:
     wrong = (
         "`Lyne`",

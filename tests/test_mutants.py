@@ -31,6 +31,8 @@ from tests.reached import Record, new_names, same_lines
 from tests.sources import PACKAGE, modules
 from tests.swapped import NotSwapped, swap
 
+pytestmark = pytest.mark.sweep  # they test a tool of the developers
+
 WHOLE = "def half(x):\n    return x / 2\n"
 
 

@@ -583,6 +583,7 @@ def test_every_used_private_part_has_a_check_in_its_module() -> None:
     assert used == checked - {("driver.py", "_set_pointer_shape")}
 
 
+@pytest.mark.sweep  # it reads the whole source
 def test_private_parts_of_textual_are_used_in_one_package_only() -> None:
     outside = [
         f"tui/{path}:{use.line}: {use.name}"
