@@ -239,7 +239,8 @@ def mbpoll(cell: Cell) -> Record:
 def whole_panel(cell: Cell) -> Record:
     """The app in a pseudo-terminal of 80 x 24, once its Monitor screen shows values."""
     reading, writing = os.pipe()
-    with tempfile.TemporaryDirectory() as state:
+    # its keeper may still write there for a moment
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as state:
         process = _start_panel(cell.wire.text, writing, state)
         try:
             if not os.read(reading, CYCLE_END.size):
