@@ -49,8 +49,18 @@ def pytest_xdist_setupnodes() -> None:
     compile_tests()
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Called before the options are read."""
+    parser.addoption("--part", metavar="K/N", help="run the Kth of N equal parts of the sweeps")
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     """Distribute the modules to the workers, long ones first, so that no long test is last."""
+    if part := config.getoption("--part"):
+        number, parts = map(int, part.split("/"))
+        chosen = [item for item in items if item.get_closest_marker("sweep")][number - 1 :: parts]
+        config.hook.pytest_deselected(items=[item for item in items if item not in set(chosen)])
+        items[:] = chosen
     workers: int = getattr(config, "workerinput", {}).get("workercount", 1)
     if workers > 1:
         modules = [list(module) for _, module in groupby(items, _dealt_with)]
