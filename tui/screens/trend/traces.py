@@ -110,9 +110,10 @@ class BandTrace:
 def reference_code(profile: Profile, entry: Parameter | None) -> str | None:
     """Return the code of the reference of a value; None if it has none in its unit."""
     for quantity, other in DRAWN_REFERENCES.items():
-        found = readout_parameter(profile, quantity), readout_parameter(profile, other)
-        if entry is not None and found[0] is entry and found[1] is not None:
-            return found[1].code if found[1].unit == entry.unit else None
+        drawn, reference = readout_parameter(profile, quantity), readout_parameter(profile, other)
+        # equal, not the same: the profile may have been read anew
+        if drawn is not None and drawn == entry and reference is not None:
+            return reference.code if reference.unit == drawn.unit else None
     return None
 
 
