@@ -118,7 +118,7 @@ def record(copy: Path, commit: str, tests: Sequence[str], jobs: int) -> Record:
     parts.mkdir(parents=True)
     environment = {**os.environ, "PYTHONPATH": str(copy), PARTS: str(parts)}
     command = [sys.executable, *PYTEST, "-n", str(jobs), "--dist", "worksteal", *tests]
-    command += ["-m", ""] if any(test.endswith(".py") for test in tests) else []
+    command += ["-m", "" if any(test.endswith(".py") for test in tests) else "not sweep"]
     subprocess.run(command, cwd=copy, env=environment, check=False)
     lines_file, tests_file = (folder() / f"{commit}.{name}" for name in ("lines", "json"))
     for file in () if tests else (*folder().glob("*.lines"), *folder().glob("*.json")):

@@ -296,15 +296,17 @@ def test_every_test_folder_is_run_by_one_of_two_commands() -> None:
 def test_gate_runs_tests_that_the_test_command_omits() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     options = settings["tool"]["pytest"]["ini_options"]
-    assert options["addopts"].endswith(" -m 'not sweep'")
+    assert options["addopts"].endswith(" -m 'not sweep and not long'")
     assert [marker.partition(":")[0] for marker in options["markers"]] == [
+        "long",
         "sweep",
         "drawn",
         "internal_errors",
     ]
-    layer = r"\.venv/bin/python -m pytest -q -n [0-9]+"
+    layer, gate = r"\.venv/bin/python -m pytest -q -n [0-9]+", CI.read_text("utf-8")
     assert re.search(rf"{layer} -m sweep", README)
-    assert re.search(rf'^ +layer {layer} .*-m sweep --part "', CI.read_text("utf-8"), re.MULTILINE)
+    assert re.search(rf'^layer {layer} .*-m "long and not sweep"$', gate, re.MULTILINE)
+    assert re.search(rf'^ +layer {layer} .*-m sweep --part "', gate, re.MULTILINE)
 
 
 def test_links_of_readme_exist() -> None:

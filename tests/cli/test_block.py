@@ -21,6 +21,8 @@ from tui.session.settings.write import Writer
 from . import commands
 from .commands import tcp_line
 
+pytestmark = pytest.mark.long
+
 LONELY = ["atv31", "atv312", "powerdrive", "proxidrive", "varmeca"]
 
 

@@ -24,6 +24,8 @@ from .commands import ended, run, tcp_line
 from .printed import form_of
 from .test_nothing_written import counted
 
+pytestmark = pytest.mark.long
+
 posix = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
 
 

@@ -12,6 +12,8 @@ from tui.drive.profile import library
 
 from .commands import held, invoked, motor, put, refused, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 DRIVE = ("-p", "powerdrive")
 COMMAND_WORD, IN_FORCE = 641, 642
 

@@ -24,6 +24,8 @@ from . import test_fault_status as fault_status
 from .commands import ended, invoked, tcp_line
 from .printed import documents, form_of, forms, forms_of
 
+pytestmark = pytest.mark.long
+
 SCHEMA = Path(__file__).resolve().parents[2] / "docs" / "cli.schema.json"
 NO_JSON = {"demo", "replay"}
 """Commands that print nothing: the panel."""

@@ -10,6 +10,8 @@ import pytest
 
 from .commands import ended, held, motor, put, refused, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 CMD, ACC = 8501, 9001
 
 

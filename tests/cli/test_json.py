@@ -14,6 +14,8 @@ from tui.session.monitor.rates import monitoring_codes
 
 from .commands import ended, tcp_line
 
+pytestmark = pytest.mark.long
+
 LINE = ("sim:atv71@2", "-d", "2")
 HEAD = {"schema", "command"}
 VALUE_KEYS = {"address", "raw", "value", "unit", "text", "taught", "quality"}

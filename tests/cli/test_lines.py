@@ -25,6 +25,8 @@ from tui.session.connect.named_lines import settings_file
 
 from .commands import held, invoked, refused, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 __all__ = ["adapters"]
 
 ACC = 9001

@@ -20,6 +20,8 @@ from tui.wire.frames import is_whole
 from .commands import ended, refused, run
 from .printed import documents
 
+pytestmark = pytest.mark.long
+
 TWO = "sim:atv71@1,atv312@2"
 
 

@@ -19,6 +19,8 @@ from tui.session.connect.open_line import OpenLine
 
 from .commands import ended, held, put, refused, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 CMD, STATUS_21, F803 = 8501, 0xFD01, 2051
 ERR5 = {"seconds": 3.0, "reaction": "Coast stop", "fault": "Err5", "begun": True}
 

@@ -19,6 +19,8 @@ from tui.session.drive import DriveSession
 from .commands import ended, refused, run, tcp_line
 from .printed import forms_of
 
+pytestmark = pytest.mark.long
+
 SET = """[set]
 format = 1
 profile = "{profile}"

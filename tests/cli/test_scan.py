@@ -27,6 +27,8 @@ from tui.wire.frames import frame, read_frame
 from .commands import ended, invoked, tcp_line
 from .printed import documents
 
+pytestmark = pytest.mark.long
+
 READS = {3, 4, 17, 43}
 """Functions that change nothing."""
 MOTORS = (DriveSpec("atv71", 2), DriveSpec("atv312", 4), DriveSpec("powerdrive", 7))

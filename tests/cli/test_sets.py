@@ -31,6 +31,8 @@ from tui.session.settings.restore import plan_for
 
 from .commands import ended, held, invoked, motor, refused, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 SP2 = 11410
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 

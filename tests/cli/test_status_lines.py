@@ -13,6 +13,8 @@ from .commands import ended, refused, run, tcp_line
 from .printed import form_of
 from .test_watch_lines import NOBODY, settings
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture
 def named() -> Iterator[tuple[str, str]]:

@@ -11,6 +11,8 @@ import pytest
 
 from .commands import ended, held, motor, put, refused, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 DRIVE = ("-p", "powerdrive")
 PRESET, COMMAND_WORD, IN_FORCE = 120, 641, 642
 

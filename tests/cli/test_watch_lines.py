@@ -24,6 +24,8 @@ from tui.session.connect.named_lines import settings_file
 
 from .commands import ended, refused, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 SHORT = ("--every", "0.1", "--count")
 NOBODY = "tcp:127.0.0.1:9,timeout=0.2"
 

@@ -20,6 +20,8 @@ from tui.session.connect.known_line import KnownLine
 
 from .commands import ended, run, tcp_line
 
+pytestmark = pytest.mark.long
+
 posix = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
 
 

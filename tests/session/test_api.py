@@ -34,6 +34,8 @@ from tui.session.connect.contradiction import Contradiction
 from tui.session.connect.open_line import demo_line
 from tui.session.journal import Journal
 
+pytestmark = pytest.mark.long
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "api.md"
 EXAMPLES = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
 

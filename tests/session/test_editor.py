@@ -31,6 +31,8 @@ from tui.session.shown import Quality
 
 from .test_command import FAMILIES, Bench, bench
 
+pytestmark = pytest.mark.long
+
 
 @asynccontextmanager
 async def editing(family: str, **spec: object) -> AsyncIterator[tuple[Bench, Editor]]:

@@ -16,6 +16,8 @@ from tui.session.journal_reading import entries_of
 from tui.session.read.upload import Upload
 from tui.session.report import report_text
 
+pytestmark = pytest.mark.long
+
 SECTIONS = [
     "## Line settings of the drive",
     "## Settings changed from the factory",

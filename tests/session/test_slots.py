@@ -31,6 +31,8 @@ from tui.simulator import DriveSpec, LineTiming, Simulation
 
 from .fake_clock import FakeClock
 
+pytestmark = pytest.mark.long
+
 INPUTS = next(b.address for b in library.load("atv71").data.blocks if b.direction == "read")
 """First register of the scanner's inputs."""
 TRIES = 5

@@ -8,6 +8,8 @@ from tui.simulator.charts.channels import ChannelPlace, channels_in_force, switc
 
 from .exchange import Exchange
 
+pytestmark = pytest.mark.long
+
 COMPACT = ("atv31", "atv312")
 ALL = (*COMPACT, "atv71")
 

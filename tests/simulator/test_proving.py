@@ -25,6 +25,8 @@ from tui.simulator.registers import Registers
 from .exchange import Exchange
 from .test_chart_own import pump, words
 
+pytestmark = pytest.mark.long
+
 KINDS = Path(__file__).parents[1] / "line" / "profiles"
 MS300 = KINDS / "ms300-kind.toml"
 FAST = ("atv21", "powerdrive")

@@ -21,6 +21,8 @@ from tui.session.fleet import FoundDrive
 from . import fakes
 from .test_flows import shown, until
 
+pytestmark = pytest.mark.long
+
 UNKNOWN = DriveIdentity(9, "", "", "", "", None, ("powerdrive", "proxidrive"))
 
 

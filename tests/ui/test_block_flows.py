@@ -37,6 +37,8 @@ from .test_flows import arm, picture, shown, until
 from .test_parameter_flows import open_file
 from .walk import every_step
 
+pytestmark = pytest.mark.long
+
 
 async def to_blocks(made: Bench, sees: str = "ETA") -> None:
     await made.pilot.press("4")

@@ -27,6 +27,8 @@ from tui.session.events import EventLog
 from . import fakes
 from .test_flows import demo, shown, to_monitor, until
 
+pytestmark = pytest.mark.long
+
 
 def panel(start: str, opener: Callable[..., object] = open_line) -> DrivePanelApp:
     return DrivePanelApp(open_line=opener, start=start, drive_documents=drive_documents)  # type: ignore[arg-type]

@@ -53,6 +53,8 @@ from tui.session.settings.applied import Applied
 from . import fakes
 from .test_flows import picture, until
 
+pytestmark = pytest.mark.long
+
 SIZES = pytest.mark.parametrize(
     "size", kept([(80, 24), (120, 40)], (80, 24)), ids=["80x24", "120x40"]
 )

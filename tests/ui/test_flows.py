@@ -42,6 +42,8 @@ from tui.widgets.lines import Lines
 
 from .fakes import press
 
+pytestmark = pytest.mark.long
+
 DRIVES = {"atv21": 35.0, "atv71": 50.0, "powerdrive": 30.0}
 
 

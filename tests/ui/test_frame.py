@@ -28,6 +28,8 @@ from tui.simulator import Simulation
 from tui.widgets.lines import Lines
 from tui.widgets.strip import FrameView
 
+pytestmark = pytest.mark.long
+
 
 class Panel:
     """The panel on two simulated drives, the first of them on Monitor."""

@@ -16,6 +16,8 @@ from tui.simulator.troubles import FaultRates
 
 from .test_frame import Panel, panel
 
+pytestmark = pytest.mark.long
+
 
 @asynccontextmanager
 async def on_frames() -> AsyncIterator[Panel]:

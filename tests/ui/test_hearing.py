@@ -31,6 +31,8 @@ from . import fakes
 from .test_flows import shown, until
 from .test_pictures import BOTH_SIZES
 
+pytestmark = pytest.mark.long
+
 ATV71 = frame(6, bytes.fromhex("2b 0e 01 01 00 00 01 01 0b") + b"ATV71HU15M3")
 """Identification of the drive at 6."""
 

@@ -40,6 +40,8 @@ from tui.simulator import DriveSpec, Simulation
 from . import fakes
 from .test_flows import picture, shown, until
 
+pytestmark = pytest.mark.long
+
 __all__ = ["adapters"]
 
 BY_ID = "serial:/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0,19200,8E1"

@@ -26,6 +26,8 @@ from tui.widgets.lines import Lines
 
 from .test_flows import shown, until
 
+pytestmark = pytest.mark.long
+
 ONE = {"atv71": 50.0}
 
 

@@ -20,6 +20,8 @@ from tui.wire.frames import frame, read_frame
 
 from .test_flows import shown, until
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(autouse=True)
 def few_settings(monkeypatch: pytest.MonkeyPatch) -> None:

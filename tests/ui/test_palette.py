@@ -26,6 +26,8 @@ from .test_flows import shown, until
 from .test_questions import writes
 from .walk import every_step
 
+pytestmark = pytest.mark.long
+
 SCREENS = {
     "line": ConnectionScreen,
     "monitor": MonitorScreen,

@@ -29,6 +29,8 @@ from .test_command_flows import Bench, bench, writes
 from .test_flows import arm, picture, shown, until
 from .test_parameter_pictures import editor_of, failed, panel
 
+pytestmark = pytest.mark.long
+
 
 async def to_parameters(made: Bench) -> ParametersScreen:
     await made.pilot.press("3")

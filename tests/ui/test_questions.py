@@ -42,6 +42,8 @@ from .test_command_flows import Bench, bench
 from .test_command_flows import writes as writes
 from .test_flows import arm, picture, shown, until
 
+pytestmark = pytest.mark.long
+
 MOMENT = 0.3
 """Seconds before which Enter and y do not answer, by the safety rules."""
 

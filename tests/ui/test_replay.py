@@ -24,6 +24,8 @@ from tui.widgets.lines import Lines
 from .test_frame import Panel
 from .test_text_is_text import MARKUP
 
+pytestmark = pytest.mark.long
+
 LIVE = "sim:atv71@1"
 
 

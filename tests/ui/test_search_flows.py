@@ -6,6 +6,7 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from dataclasses import replace
 
+import pytest
 from textual.pilot import Pilot
 from textual.widgets import Input
 
@@ -18,6 +19,8 @@ from tui.session.paths import recent_lines
 from tui.simulator import DriveSpec, FaultRates, Simulation
 
 from .test_flows import shown, until
+
+pytestmark = pytest.mark.long
 
 
 @asynccontextmanager

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
+import pytest
+
 from tui.app import DrivePanelApp
 from tui.bus.line import Line
 from tui.screens.dialogs.confirm import Confirm
@@ -12,6 +14,8 @@ from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.monitor.line_health import SEVERAL_FRAMES
 
 from .test_frame import Panel
+
+pytestmark = pytest.mark.long
 
 FIRST, SECOND = "sim:atv71@1", "sim:atv312@1"
 

@@ -17,6 +17,8 @@ from tui.widgets.plain import Plain
 from .test_command_flows import Bench, bench, output, writes
 from .test_flows import until
 
+pytestmark = pytest.mark.long
+
 
 async def requested(made: Bench) -> None:
     assert made.app.opened is not None

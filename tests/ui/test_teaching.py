@@ -17,6 +17,8 @@ from tui.session.command.stop_report import Phase
 from .test_command_flows import Bench, bench, writes
 from .test_flows import shown, until
 
+pytestmark = pytest.mark.long
+
 
 async def pick(made: Bench, code: str) -> None:
     """Select a value on Monitor and open the question for its display value."""

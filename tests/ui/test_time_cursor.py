@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 
+import pytest
+
 from tui.app import DrivePanelApp
 from tui.screens.monitor.screen import MonitorScreen
 
 from .test_flows import demo, shown, to_monitor, until
+
+pytestmark = pytest.mark.long
 
 
 def read_out(app: DrivePanelApp) -> str:

@@ -33,6 +33,8 @@ from tui.widgets.lines import Lines
 from . import fakes
 from .test_trend_pictures import BANDS, SCENES, WALL, Scene, panel, show
 
+pytestmark = pytest.mark.long
+
 NOW = WALL
 
 

@@ -26,7 +26,10 @@ from . import fakes
 from .test_flows import shown, until
 from .test_frame import panel
 
-pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
+pytestmark = [
+    pytest.mark.long,
+    pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here"),
+]
 
 
 @pytest.fixture

@@ -19,6 +19,8 @@ from tui.session.diagnosis.reply_evidence import ReplyEvidence
 
 from .test_frame import Panel, panel
 
+pytestmark = pytest.mark.long
+
 
 async def wiring(made: Panel) -> WiringScreen:
     await made.pilot.press("I")
