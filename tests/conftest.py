@@ -58,9 +58,7 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Distribute the modules to the workers, long ones first, so that no long test is last."""
     if part := config.getoption("--part"):
         number, parts = map(int, part.split("/"))
-        chosen = [item for item in items if item.get_closest_marker("sweep")][number - 1 :: parts]
-        config.hook.pytest_deselected(items=[item for item in items if item not in set(chosen)])
-        items[:] = chosen
+        items[:] = [item for item in items if item.get_closest_marker("sweep")][number - 1 :: parts]
     workers: int = getattr(config, "workerinput", {}).get("workercount", 1)
     if workers > 1:
         modules = [list(module) for _, module in groupby(items, _dealt_with)]

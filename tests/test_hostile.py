@@ -11,7 +11,7 @@ import pytest
 
 from benchmarks.hostile_cases import CASES, mutated, no_commands
 
-ROUNDS = {"profiles": 20, "sets": 60, "blocks": 100, "state": 150, "replies": 400}
+ROUNDS = {"profiles": 40, "sets": 60, "blocks": 100, "state": 150, "replies": 400}
 SEED = 7
 
 

@@ -122,6 +122,22 @@ def test_source_package_contains_the_whole_repository(unpacked: Path) -> None:
     assert [name for name in names if not (unpacked / name).is_file()] == []
 
 
+@pytest.mark.sweep  # the gate does it, too
+def test_source_package_passes_its_own_tests(unpacked: Path) -> None:
+    command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"]
+    part = ["tests/wire", "tests/drive/test_library.py", "tests/drive/test_values.py"]
+    done = subprocess.run(
+        [*command, *part],
+        cwd=unpacked, capture_output=True, text=True, timeout=PATIENCE * 5, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout + done.stderr
+    where = "import tui, pathlib; print(pathlib.Path(tui.__file__).resolve().parents[1])"
+    found = subprocess.run(
+        [sys.executable, "-c", where], cwd=unpacked, capture_output=True, text=True, check=True
+    )
+    assert Path(found.stdout.strip()) == unpacked.resolve()
+
+
 # The manual page
 
 

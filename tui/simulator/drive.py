@@ -47,13 +47,13 @@ WATCH_STARTERS = frozenset({"command_word", "command_frequency", "command_speed"
 
 
 @lru_cache(maxsize=32)  # thirty drives of one kind on a line begin alike
-def first_words(profile: Profile, rating: RatingPlate) -> tuple[Mapping[int, int], ...]:
+def first_words(
+    profile: Profile, rating: RatingPlate
+) -> tuple[Mapping[int, int], Mapping[int, int]]:
     """Return the words of a drive set up for its line, and of one at its factory settings."""
-    places = register_map(profile)
-    return tuple(
-        places.words(profile, first_values(profile, rating, chosen))
-        for chosen in (traits_of(profile).first_values, {})
-    )
+    words = register_map(profile).words
+    set_up = first_values(profile, rating, traits_of(profile).first_values)
+    return words(set_up), words(first_values(profile, rating, {}))
 
 
 class SimulatedDrive:

@@ -28,12 +28,15 @@ class RegisterMap:
     """Places of all parameters of a profile, and those that a drive keeps."""
 
     def __init__(self, profile: Profile) -> None:
+        self._parameters = profile.parameters
         self.folded = {p.code.casefold(): p for p in profile.parameters}
+        """Parameters by their codes in lower case."""
         self.whole: dict[str, tuple[int, int, int]] = {}
         """Address and range of each parameter that is one whole word: nearly every one."""
         self.fields: dict[int, int] = {}
         """Bits of a whole word that are parameters of their own, by address."""
         self.owner: dict[int, Parameter] = {}
+        """The first parameter at each address, also at those of copies in EEPROM."""
         self.copies: dict[int, int] = {}
         """Addresses in RAM, by those of their copies in EEPROM."""
         for parameter in profile.parameters:
@@ -49,6 +52,7 @@ class RegisterMap:
                 for place, address in enumerate(addresses):
                     self.copies[parameter.eeprom_address + place] = address
         self.owner |= {copy: self.owner[address] for copy, address in self.copies.items()}
+        # words that only the drive itself changes, and those that it forgets at power-down
         self.own = {address for address, p in self.owner.items() if p.access == "r"}
         self.volatile = {address for address, p in self.owner.items() if is_volatile(p)}
 
@@ -67,10 +71,10 @@ class RegisterMap:
         for words in memories:
             _put_words(words, parameter, min(max(raw, low), high))
 
-    def words(self, profile: Profile, raws: Mapping[str, int]) -> dict[int, int]:
+    def words(self, raws: Mapping[str, int]) -> dict[int, int]:
         """Return the words of all parameters, from their raw values by code."""
         words: dict[int, int] = {}
-        for parameter in profile.parameters:
+        for parameter in self._parameters:
             self.store(parameter, raws[parameter.code], words)
         return words
 
