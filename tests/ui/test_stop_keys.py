@@ -427,10 +427,9 @@ async def test_scan_stops_drives_after_a_stop_of_all_while_its_line_is_opened(
         app.connection.action_scan()
         await until(pilot, lambda: app.fleet.search is not search)  # type: ignore[union-attr]
         assert not app.fleet.search.stops_found  # type: ignore[union-attr]
-        assert {report.phase for report in stopper.reports.values()} <= {
-            Phase.STOPPING,
-            Phase.STOPPED,
-        }
+        sent = {Phase.STOPPING, Phase.STOPPED}
+        await until(pilot, lambda: {it.phase for it in stopper.reports.values()} <= sent)
+        assert not [event for event in app.events.events if "NOT STOPPED" in event.text]
 
 
 async def test_stop_of_all_before_a_line_that_does_not_open_is_reported() -> None:
