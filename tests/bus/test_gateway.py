@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import socket
 import struct
+import time
 from contextlib import suppress
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.bus.gateway import server
+from tui.bus.gateway import server, talk
 from tui.bus.gateway.pdu import (
     IdentifyRequested,
     ReadRequested,
@@ -23,7 +24,7 @@ from tui.bus.gateway.pdu import (
     words_pdu,
     written_pdu,
 )
-from tui.bus.gateway.room import ServedConnection, makes_room
+from tui.bus.gateway.room import ServedConnection, host_of, makes_room
 from tui.bus.gateway.server import HEADER, Awake, TcpGateway, TcpRequest
 from tui.bus.gateway.talk import MOST_AT_ONCE, peer_text
 from tui.wire.frames import wire_place
@@ -290,6 +291,12 @@ async def test_idle_client_makes_room_for_another(
     """Programs that forgot 64 connections kept out the one that was to stop a motor."""
     monkeypatch.setattr(server, "MOST_CLIENTS", 3)
     gone: list[str] = []
+
+    def slow_host_of(peer: object) -> str:
+        time.sleep(0.005)  # a busy computer: each connection is looked at later than the one before
+        return host_of(peer)
+
+    monkeypatch.setattr(talk, "host_of", slow_host_of)
 
     async def answer(request: TcpRequest) -> bytes:
         if request.unit == 1:

@@ -148,7 +148,8 @@ class TcpGateway:
 
     def _make_room(self, host: str) -> None:
         """Close another connection if there are too many with the one from this host."""
-        here = {task: talk.place for task, talk in self._talks.items() if not talk.goes}
+        now = asyncio.get_running_loop().time()
+        here = {task: talk.place(now) for task, talk in self._talks.items() if not talk.goes}
         if len(here) < MOST_CLIENTS:
             return
         leaving = [task for task, talk in self._talks.items() if talk.goes]

@@ -44,11 +44,10 @@ class ClientTalk:
         """True if no further read is accepted."""
         return len(self._under_way) >= MOST_AT_ONCE
 
-    @property
-    def place(self) -> ServedConnection:
-        """Its data for the choice of the connection to close."""
+    def place(self, now: float) -> ServedConnection:
+        """Its data for the choice of the connection to close; `now` is the same for all of them."""
         waits = bool(self._under_way) and not self._writes
-        idle = 0.0 if waits else asyncio.get_running_loop().time() - self.requested
+        idle = 0.0 if waits else now - self.requested
         host = host_of(self.writer.get_extra_info("peername"))
         return ServedConnection(host, idle, writes=bool(self._writes))
 
