@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from tests.programs import Served, drivepanel, pty_pair, served, wait_until
+from tests.sweeps import kept
 from tui.drive.profile import library
 
 from .conftest import HERE
@@ -73,7 +74,7 @@ class Bench:
         return {code: item["value"] for code, item in reported["values"].items()}
 
 
-@pytest.fixture(params=KINDS, ids=lambda kind: kind.profile)
+@pytest.fixture(params=kept(KINDS, KINDS[1]), ids=lambda kind: kind.profile)
 def bench(request: pytest.FixtureRequest, awkward_drive: Path) -> Iterator[Bench]:
     kind: Kind = request.param
     folder = library.user_folder()

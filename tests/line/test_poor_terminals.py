@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from tests.sweeps import kept
+
 from .pty_panel import panel_on_a_pty
 
 TERMINALS: dict[str, tuple[tuple[str, ...], dict[str, str], tuple[int, int]]] = {
@@ -22,7 +24,7 @@ STOP_KEYS = ("\x1b[24~", "\x1bO[", "\x1b[X", "\x9b24~", "\x1b[20~", "\x1bOX", "\
 """F12 and F9 in the dialects of terminals, and Space."""
 
 
-@pytest.mark.parametrize("name", TERMINALS)
+@pytest.mark.parametrize("name", kept(TERMINALS, "no UTF-8", "dumb", "60x16", "much too small"))
 def test_stop_keys_stop_on_a_poor_terminal(name: str) -> None:
     options, environment, size = TERMINALS[name]
     with panel_on_a_pty(*options, size=size, environment=environment) as panel:
