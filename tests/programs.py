@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import re
 import select
+import shutil
 import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import tty
@@ -78,10 +80,17 @@ def served(
 
 @contextmanager
 def simulated(*arguments: str, stdin: int = subprocess.DEVNULL) -> Iterator[Served]:
-    """Run `drivepanel simulate` for the block."""
+    """Run `drivepanel simulate` for the block.
+
+    The link to a pseudo-terminal is removed before that is closed: see `pty_pair`.
+    """
     command = [*DRIVEPANEL, "simulate", *arguments]
     with served(command, ready="Ready:", stdin=stdin) as program:
-        yield program
+        try:
+            yield program
+        finally:
+            if "--pty" in arguments:
+                Path(arguments[arguments.index("--pty") + 1]).unlink(missing_ok=True)
 
 
 def keepers(*folders: Path) -> list[int]:
@@ -170,10 +179,17 @@ def rtu_tcp(simulation: Simulation) -> str:
 
 @contextmanager
 def pty_pair() -> Iterator[tuple[str, str]]:
-    """Two pseudo-terminals joined by a cable: paths of the two ends."""
+    """Two pseudo-terminals joined by a cable: paths of links to the two ends.
+
+    The number of a pseudo-terminal is reused as soon as that is closed. A keeper that looks for its
+    lost line by number would read the keys of another test's terminal, and write on its screen.
+    """
     pairs = [os.openpty(), os.openpty()]
-    for _, slave in pairs:
+    folder = tempfile.mkdtemp(prefix="cable-")
+    links = [Path(folder, end) for end in ("near", "far")]
+    for link, (_, slave) in zip(links, pairs, strict=True):
         tty.setraw(slave)
+        link.symlink_to(os.ttyname(slave))
     bell, rope = os.pipe()
     masters = [master for master, _ in pairs]
 
@@ -189,8 +205,9 @@ def pty_pair() -> Iterator[tuple[str, str]]:
     cable = threading.Thread(target=carry, name="cable", daemon=True)
     cable.start()
     try:
-        yield os.ttyname(pairs[0][1]), os.ttyname(pairs[1][1])
+        yield str(links[0]), str(links[1])
     finally:
+        shutil.rmtree(folder)
         os.write(rope, b"x")
         cable.join()
         for handle in (bell, rope, *(number for pair in pairs for number in pair)):
