@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import re
 import signal
@@ -15,7 +16,18 @@ from typing import Any
 
 import pytest
 
-from tests.programs import DRIVEPANEL, PATIENCE, is_running, served, wait_until
+from tests.programs import (
+    DRIVEPANEL,
+    PATIENCE,
+    drivepanel,
+    is_running,
+    keepers,
+    port_of,
+    served,
+    simulated,
+    wait_until,
+)
+from tui.safety import LINGERS
 from tui.session.signals import OF_ERRORS, SUSPENDING, UNTOUCHED, ending_signals, signal_name
 from tui.simulator import DriveSpec, Simulation
 
@@ -55,6 +67,33 @@ def test_every_signal_of_the_system_has_one_treatment() -> None:
     every = sorted([*named, *ending_signals()])
     assert every == sorted(map(int, signal.valid_signals()))
     assert len({signal_name(number) for number in every}) == len(every)
+
+
+def give_to_another_thread(pid: int, number: int) -> None:
+    """Send a signal to a thread that is not the main one, as the system itself may choose it."""
+    for thread in map(int, os.listdir(f"/proc/{pid}/task")):
+        status = Path(f"/proc/{pid}/task/{thread}/status").read_text()
+        blocked = int(re.findall(r"SigBlk:\s*(\w+)", status)[0], 16)
+        if thread != pid and not blocked >> (number - 1) & 1:
+            assert ctypes.CDLL(None).tgkill(pid, thread, number) == 0
+            return
+    pytest.fail("all other threads block it")
+
+
+def test_simulation_ends_by_a_signal_that_another_thread_took() -> None:
+    with simulated("atv71@1", "--tcp", "127.0.0.1:0") as simulation:
+        give_to_another_thread(simulation.process.pid, signal.SIGINT)
+        assert simulation.process.wait(PATIENCE / 4) == 0
+
+
+def test_keeper_ends_by_a_signal_that_another_thread_took() -> None:
+    """It would hold its line for as long as it looks after a motor."""
+    with simulated("atv71@1", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        assert drivepanel("read", line, "RFR", "-d", "1", "-p", "atv71").returncode == 0
+        (keeper,) = keepers()
+        give_to_another_thread(keeper, signal.SIGTERM)
+        wait_until(lambda: not is_running(keeper), "the keeper ended", LINGERS / 2)
 
 
 def run_and_signal(*numbers: int, ignored: bool = False) -> tuple[int, float, bool, str]:

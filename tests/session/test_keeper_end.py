@@ -128,7 +128,7 @@ def test_keeper_goes_on_if_a_program_attached_since_unless_it_is_ordered_to_end(
             bench.facts.others.clear()  # the last one leaves
 
     bench.keeper._ended.set()
-    monkeypatch.setattr(bench.keeper._ended, "wait", wait)
+    monkeypatch.setattr(process, "wait_for", lambda _: wait())
     if ordered:
         bench.keeper.end()
     bench.keeper._until_unneeded()

@@ -30,6 +30,7 @@ from tui.session.events import EventLog
 from tui.session.journal import Journal
 from tui.session.logs import start_logging
 from tui.session.sharing.orphan_motors import OrphanMotorGuard
+from tui.session.signals import wait_for
 
 ENDING_SIGNALS = ("SIGTERM", "SIGINT", "SIGQUIT")
 IGNORED_SIGNALS = ("SIGHUP", "SIGUSR1", "SIGUSR2", "SIGTSTP", "SIGTTIN", "SIGTTOU")
@@ -97,10 +98,10 @@ class Keeper:
 
         Programs that stay start the next keeper.
         """
-        self._ended.wait()
+        wait_for(self._ended)
         while self._line.facts.others and not self._ordered:
             self._ended.clear()  # a program attached in the meantime
-            self._ended.wait()
+            wait_for(self._ended)
         begun = time.monotonic()
         while self._is_needed(time.monotonic() - begun):
             time.sleep(CARE_INTERVAL)

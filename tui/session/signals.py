@@ -23,6 +23,9 @@ end this one in order, caused by an error of its own they end it immediately."""
 OF_KEYS = ("SIGINT", "SIGQUIT")
 """Ctrl-C and Ctrl-\\: a script ignores them for what it starts in the background."""
 
+HANDLED_WITHIN = 0.5
+"""Seconds within which the main thread runs the handler of a signal that another thread took."""
+
 _taken: set[int] = set()
 """Signals that are handled here now."""
 
@@ -46,6 +49,16 @@ def ending_signals() -> frozenset[int]:
 def signal_numbers(names: Collection[str]) -> frozenset[int]:
     """The numbers of those that this system has."""
     return frozenset(int(getattr(signal, name)) for name in names if hasattr(signal, name))
+
+
+def wait_for(event: threading.Event) -> None:
+    """Return once an event is set; until then the main thread runs the handlers of signals.
+
+    Only the main thread runs them. The system may give a signal to another thread, which happens
+    on a busy computer. A wait without a timeout does not end then: the signal has no effect.
+    """
+    while not event.wait(HANDLED_WITHIN):
+        pass
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from tui.session.signals import handled
+from tui.session.signals import handled, wait_for
 
 from ..shared.completion import complete_profile
 from ..shared.numbers import FiniteRange
@@ -219,7 +219,7 @@ def simulate(
         run_script(bench, lines, as_json)
         inputs = (bench, as_json)
         threading.Thread(target=follow_input, args=inputs, name="inputs", daemon=True).start()
-        stop.wait()
+        wait_for(stop)
 
 
 def simulation_of(
