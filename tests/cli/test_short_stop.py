@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import socket
 import stat
 import subprocess
@@ -29,11 +30,13 @@ from tui.cli import short_stop
 from tui.cli.main import main
 from tui.cli.short_stop import holder_address, line_keys, parse_stop, stop_at_once
 from tui.session.connect import line_key as line_keys_module
+from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.line_key import line_key
 from tui.session.connect.named_lines import is_name
 from tui.session.connect.open_line import open_line
 from tui.session.connect.share_place import share_place
 from tui.session.paths import state_folder
+from tui.session.starts.starts import Starts
 from tui.simulator import DriveSpec, Simulation
 
 LINE = "serial:/dev/ttyX0"
@@ -396,6 +399,29 @@ def test_short_stop_reaches_the_holder() -> None:
             stop_at_once(["stop", line, "-d", "2", "-d", "3"])
             # the program of its process, here the panel, is named
             assert heard == [((2, 3), "a direct stop")]
+
+
+@pytest.mark.parametrize("group", [False, True])
+def test_short_stop_remembers_the_starts_that_the_holder_removes(
+    group: bool, tmp_path: Path
+) -> None:
+    if group:
+        (tmp_path / "group").mkdir()
+    drive = DriveIdentity(1, "", "", "", "", None, ())
+    with Simulation([DriveSpec("proxidrive", 1)]) as simulation:
+        line = f"serial:{simulation.serve_pty()},19200,8N2"
+        starts = Starts()
+        starts.begin(starts.record(line, drive, "proxidrive", "forward", program="run"))
+        if group:
+            shutil.rmtree(starts.folder)
+        else:
+            (starts.folder / "damaged.json").write_text("{")
+        with closing(open_line(line, wait=10, program="panel")):
+            stop_at_once(["stop", line])
+        starts.note_stop(line, 1)
+        assert starts.close()
+        assert Starts().newest(line) == {}
+        assert Starts().newest(line, short_stop.STARTS)[1].profile == "proxidrive"
 
 
 @pytest.mark.parametrize("closes", [False, True])

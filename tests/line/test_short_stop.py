@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, closing
 from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -34,6 +35,16 @@ from tui.__main__ import main
 main()
 """
 """The program with no working import."""
+SLOW_TO_START = """
+import sys, time
+from tui.cli.short_stop import stop_at_once
+stop_at_once(sys.argv[1:])
+while not sys.stdin.readline():
+    time.sleep(0.1)
+from tui.cli.main import main
+main()
+"""
+"""The program on a slow computer: its imports begin with a line on standard input."""
 
 
 @pytest.fixture
@@ -92,6 +103,25 @@ def test_stop_after_a_short_stop_is_carried_out_and_reported_normally(panel: Ope
     assert heard[0][1].pid == heard[-1][1].pid
     assert heard[0][1].id != heard[-1][1].id
     assert [attached for *_, attached in heard[:2]] == [False, True]
+
+
+def test_slow_command_knows_the_family_of_a_motor_that_its_short_stop_has_stopped() -> None:
+    """The keeper had removed the record of the start: the stopped motor was called NOT STOPPED."""
+    with bench(DriveSpec("proxidrive", 1, sets={"6.43": 1})) as (simulation, line):
+        until = ("--for", "2", "--leave-running")
+        started = drivepanel("run", line, "-p", "proxidrive", "--arm", *until)
+        assert turns(simulation), started.stderr
+        starts = Path(os.environ["DRIVEPANEL_STATE"], "starts")
+        assert list(starts.glob("*.json"))
+        pipe = subprocess.PIPE
+        with subprocess.Popen(
+            [sys.executable, "-c", SLOW_TO_START, "stop", line],
+            stdin=pipe, stdout=pipe, stderr=pipe, text=True,
+        ) as command:  # fmt: skip
+            wait_until(lambda: not list(starts.glob("*.json")), "the keeper has removed the record")
+            output, error = command.communicate("begin\n", timeout=PATIENCE)
+    assert "Device 1, Proxidrive: stopped." in output
+    assert (command.returncode, "NOT STOPPED" in error) == (0, False)
 
 
 def test_other_kinds_of_stop_are_not_short_stops(panel: OpenLine) -> None:

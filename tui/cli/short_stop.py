@@ -28,6 +28,11 @@ _HOST = frozenset("abcdefghijklmnopqrstuvwxyz0123456789.-_")
 _DEVICE_LINKS = "/dev/serial"
 _HOSTS_FILE = "/etc/hosts"
 
+STARTS: list[str] = []
+"""The starts on record when the stop was given. The holder of the line removes that of a motor that
+it has stopped, and the family of the drive is known by nothing else if it does not identify itself.
+"""
+
 
 def stop_at_once(words: list[str]) -> None:
     """Give the stop of a command line to the holder of the line, if there is one."""
@@ -240,6 +245,19 @@ def _state_folder() -> str:
     return f"{folder}/drivepanel" if folder.startswith("/") else os.devnull
 
 
+def _starts() -> list[str]:
+    """The records of starts, as tui.session.starts.files writes them."""
+    group = os.environ.get("DRIVEPANEL_SHARE_FOLDER") or "/run/drivepanel"
+    found: list[str] = []
+    for folder in (f"{_state_folder()}/starts", f"{group}/starts"):
+        try:
+            names = [name for name in os.listdir(folder) if name.endswith(".json")]
+            found += [_content(f"{folder}/{name}") for name in names]
+        except (OSError, ValueError):
+            continue
+    return found
+
+
 def _lock_name(key: str) -> str:
     readable = "".join(text if text.isascii() and text.isalnum() else "-" for text in key)
     readable = "-".join(filter(None, readable.split("-")))[-24:]
@@ -296,6 +314,7 @@ def _send(address: str, devices: str) -> None:
             address = f"/proc/self/fd/{folder}/{os.path.basename(address)}"
         connection.connect(address)
         connection.send(f"STOP {devices}\n".encode())
+        STARTS[:] = _starts()
         connection.recv(len("GIVEN\n"))
     finally:
         connection.close()

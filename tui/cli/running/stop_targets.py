@@ -156,13 +156,15 @@ async def remembered(opened: OpenLine) -> dict[int, StartRecord]:
     from tui.bus.link import label
     from tui.session.starts.starts import Starts
 
+    from ..short_stop import STARTS
+
     found: list[dict[int, StartRecord]] = []
     loop, done = asyncio.get_running_loop(), asyncio.Event()
 
     def look() -> None:
         try:
             with suppress(OSError):
-                found.append(Starts().newest(label(opened.line.link)))
+                found.append(Starts().newest(label(opened.line.link), STARTS))
         finally:
             with suppress(RuntimeError):  # the loop has ended: no task waits for it
                 loop.call_soon_threadsafe(done.set)

@@ -12,7 +12,7 @@ import logging
 import os
 import re
 import stat
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
@@ -138,6 +138,15 @@ def _read(path: Path) -> StartRecord | None:
         with suppress(OSError):
             path.replace(path.with_suffix(".damaged"))
     return None
+
+
+def records_in(texts: Iterable[str]) -> list[StartRecord]:
+    """Return the records in the texts of files; those that are damaged are left out."""
+    found = []
+    for text in texts:
+        with suppress(msgspec.MsgspecError):
+            found.append(msgspec.json.decode(text, type=StartRecord))
+    return found
 
 
 def start_records(folder: Path | None) -> StartFiles | StartFolders:

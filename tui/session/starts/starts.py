@@ -11,7 +11,7 @@ import math
 import os
 import threading
 from collections import deque
-from collections.abc import Collection
+from collections.abc import Collection, Iterable
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -23,7 +23,7 @@ from tui.safety import START_PATIENCE
 from ..clock import REAL_CLOCK, Clock
 from ..connect.known_lines import remembered_text
 from ..connect.line_key import line_key
-from .files import start_records
+from .files import records_in, start_records
 from .processes import Processes
 from .record import OVERTAKEN, StartNotRecorded, StartOvertaken, StartRecord
 
@@ -219,15 +219,19 @@ class Starts:
             if task.record is None and line_key(task.drive[0]) == key
         }
 
-    def _of(self, line: str) -> list[StartRecord]:
+    def _of(self, line: str, removed: Iterable[StartRecord] = ()) -> list[StartRecord]:
         """Return the starts of a line, the newest last."""
         key = line_key(line)
-        here = [record for record in self._files.records() if line_key(record.line) == key]
+        every = [*removed, *self._files.records()]
+        here = [record for record in every if line_key(record.line) == key]
         return sorted(here, key=lambda item: item.begun.timestamp() if item.begun else 0.0)
 
-    def newest(self, line: str) -> dict[int, StartRecord]:
-        """Return the last start by device, even if its program has ended. Reads files."""
-        return {record.device: record for record in self._of(line)}
+    def newest(self, line: str, texts: Iterable[str] = ()) -> dict[int, StartRecord]:
+        """Return the last start by device, even if its program has ended. Reads files.
+
+        `texts` are records that may have been removed since they were read.
+        """
+        return {record.device: record for record in self._of(line, records_in(texts))}
 
     def close(self, timeout: float = 1.0) -> bool:
         """Wait at most so many seconds for the disk work; return False if it is not done."""
