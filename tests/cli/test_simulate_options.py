@@ -120,7 +120,7 @@ def test_place_of_a_simulation(
     monkeypatch.setattr(
         "tui.bus.transport.ports.open_serial", lambda *given: " ".join(map(str, given))
     )
-    at_once = SimpleNamespace(set=lambda: None, wait=lambda: None)
+    at_once = SimpleNamespace(set=lambda: None, wait=lambda _: True)
     thread = SimpleNamespace(start=lambda: None)
     threads = SimpleNamespace(Event=lambda: at_once, Thread=lambda **_: thread)
     monkeypatch.setattr(f"{COMMANDS}.simulate.threading", threads)
