@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import random
+import signal
 import threading
 from pathlib import Path
 from types import SimpleNamespace
@@ -70,6 +71,24 @@ def test_cancelling_at_any_moment_does_not_shift_replies(open_line: OpenLine) ->
     with PtyPeer(honest) as peer:
         line = open_line(SerialLink(peer.path, 115200))
         asyncio.run(work(line))
+
+
+def test_threads_of_a_line_take_no_signal(open_line: OpenLine) -> None:
+    """Only the main thread runs handlers: in a script it may sleep while its motor runs."""
+    blocked: list[set[int]] = []
+
+    def look() -> None:
+        blocked.append(set(signal.pthread_sigmask(signal.SIG_BLOCK, ())))
+
+    async def work() -> None:
+        look()
+        await asyncio.to_thread(look)
+
+    with PtyPeer(honest) as peer:
+        line = open_line(SerialLink(peer.path, 115200))
+        line.spawn(work, "a look")
+        eventually(lambda: len(blocked) == 2)
+    assert all({signal.SIGTERM, signal.SIGINT, signal.SIGHUP} <= found for found in blocked)
 
 
 def test_closing_at_any_moment_ends_all_requests() -> None:

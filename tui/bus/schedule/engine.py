@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import signal
 import threading
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -252,6 +253,9 @@ class Engine:
 
     def _work(self, loop: asyncio.AbstractEventLoop) -> None:
         """The thread: run the loop until closed, then leave nothing behind."""
+        if hasattr(signal, "pthread_sigmask"):
+            # for the main thread, which alone runs handlers: a signal taken here would not wake it
+            signal.pthread_sigmask(signal.SIG_BLOCK, signal.valid_signals())
         try:
             self._main = loop.create_task(self._connection.run())
             loop.run_until_complete(self._main)
