@@ -73,7 +73,6 @@ WITHOUT_LOCK = {
     "Stopper._report": ("_reports _events", "set in one step; a log with a lock of its own"),
     "Stopper.stop": ("_quiet", "one entry, set in one step"),
     "Stopper.reports": ("_reports", "copied in one step"),
-    "UnknownDrivePoller.keep": ("_workers", "one entry, set in one step"),
     "UnknownDrivePoller.stop": ("_workers", "copied in one step"),
     "WorkQueue.busy_for": ("_waiting", "copied in one step"),
     "WorkQueue.report": ("outcome", "replaced as a whole"),

@@ -18,6 +18,7 @@ from tui.bus.api import DeviceState, LineWorker, Priority
 from tui.bus.errors import LineLost, NoAnswer
 from tui.bus.keep_alive import KeepAlive
 from tui.drive.chart import ENABLED_KINDS
+from tui.session.connect.address_prober import known_profiles
 from tui.session.drive import DriveSession
 from tui.session.monitor import line_watch as line_watches
 from tui.session.monitor.line_watch import GLANCE, LineWatch
@@ -158,6 +159,28 @@ async def test_drive_of_unknown_family_is_kept_alive_until_it_is_known() -> None
     assert [(alive.device, alive.timeout) for alive in kept_alive(line)] == [(7, UNKNOWN_TIMEOUT)]
     strangers.stop()
     assert kept_alive(line) == []
+
+
+async def test_unknown_drive_is_kept_alive_if_its_work_is_faster_than_the_caller(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a busy computer the drive was not polled at all, and would have tripped."""
+    line = BackgroundListener(20)
+    strangers, spawn = UnknownDrivePoller(line), line.spawn
+    begun: list[Thread] = []
+    known_profiles()  # the work needs them, and the next time it is fast
+
+    def spawn_and_pause(work: Callable[[], Coroutine[Any, Any, None]], name: str) -> LineWorker:
+        begun.append(Thread(target=lambda: asyncio.run(work())))
+        begun[0].start()
+        begun[0].join(0.3)  # it would be done by then
+        return spawn(asyncio.Event().wait, name)
+
+    monkeypatch.setattr(line, "spawn", spawn_and_pause)
+    strangers.keep(7)
+    begun[0].join()
+    assert [alive.device for alive in kept_alive(line)] == [7]
+    strangers.stop()
 
 
 async def test_unknown_drive_that_is_let_go_as_it_is_found_is_not_kept_alive(

@@ -31,7 +31,8 @@ class UnknownDrivePoller:
         """Keep a drive alive until `let_go` or `stop`."""
         self.let_go(device)
         work = partial(self._begin, device)
-        with suppress(LineClosed):  # a closed line sends no keep-alive reads
+        # a closed line sends no keep-alive reads; the work waits until it is noted
+        with suppress(LineClosed), self._changing:
             self._workers[device] = self._line.spawn(work, f"stranger {device}")
 
     def let_go(self, device: int) -> None:
