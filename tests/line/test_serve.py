@@ -106,6 +106,7 @@ def test_mbpoll_reads_and_stops_while_a_program_commands(programs: ExitStack, pe
 
         def poll(address: int, *values: str) -> subprocess.CompletedProcess[str]:
             options = ["-m", "tcp", "-p", str(made.port), "-a", "1", "-0", "-1", "-t", "4"]
+            options += ["-o", "10"]  # its own second is too short on a busy computer
             return subprocess.run(
                 [mbpoll, *options, "-r", str(address), "127.0.0.1", *values],
                 capture_output=True,
