@@ -416,6 +416,8 @@ def test_short_stop_remembers_the_starts_that_the_holder_removes(
             shutil.rmtree(starts.folder)
         else:
             (starts.folder / "damaged.json").write_text("{")
+            (starts.folder / "a-binary.json").write_bytes(b"\xff")
+            (starts.folder / "a-removed.json").symlink_to("nowhere")
         with closing(open_line(line, wait=10, program="panel")):
             stop_at_once(["stop", line])
         starts.note_stop(line, 1)

@@ -211,7 +211,7 @@ def holder_address(line: str) -> str:
     keys, real = line_keys(line)
     if not keys or os.environ.get("DRIVEPANEL_SHARE_GROUP"):
         return ""
-    group = os.environ.get("DRIVEPANEL_SHARE_FOLDER") or "/run/drivepanel"
+    group = _group_folder()
     found: set[str] = set()
     for key in keys:
         name = _lock_name(key)
@@ -246,16 +246,20 @@ def _state_folder() -> str:
 
 
 def _starts() -> list[str]:
-    """The records of starts, as tui.session.starts.files writes them."""
-    group = os.environ.get("DRIVEPANEL_SHARE_FOLDER") or "/run/drivepanel"
+    """The records of starts, as tui.session.starts.files writes them; none that cannot be read."""
     found: list[str] = []
-    for folder in (f"{_state_folder()}/starts", f"{group}/starts"):
-        try:
-            names = [name for name in os.listdir(folder) if name.endswith(".json")]
-            found += [_content(f"{folder}/{name}") for name in names]
-        except (OSError, ValueError):
-            continue
+    for folder in (f"{_state_folder()}/starts", f"{_group_folder()}/starts"):
+        for name in os.listdir(folder) if os.access(folder, os.R_OK | os.X_OK) else ():
+            try:
+                if name.endswith(".json"):
+                    found.append(_content(f"{folder}/{name}"))
+            except (OSError, ValueError):
+                continue
     return found
+
+
+def _group_folder() -> str:
+    return os.environ.get("DRIVEPANEL_SHARE_FOLDER") or "/run/drivepanel"
 
 
 def _lock_name(key: str) -> str:

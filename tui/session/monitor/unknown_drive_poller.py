@@ -31,7 +31,7 @@ class UnknownDrivePoller:
         """Keep a drive alive until `let_go` or `stop`."""
         self.let_go(device)
         work = partial(self._begin, device)
-        # a closed line sends no keep-alive reads; the work waits until it is noted
+        # a closed line sends no keep-alive reads; the work waits until its worker is noted
         with suppress(LineClosed), self._changing:
             self._workers[device] = self._line.spawn(work, f"stranger {device}")
 
