@@ -237,12 +237,13 @@ async def test_idle_timeout_is_found() -> None:
         assert (await found_on(line)).rung == "idle-close"
 
 
+@pytest.mark.usefixtures("patient_lines")  # after a late reply, all reads are needed
 async def test_reads_end_early_once_clean_ones_exclude_a_poor_line() -> None:
     with opened({}, "rtu-tcp") as line:
         measure = (await found_on(line, reads=200)).sight.measure
         assert measure is not None
-        # the few reads before, and the proof of the step, count too; a busy computer repeats some
-        assert CLEAN_READS - 10 <= measure.requested <= CLEAN_READS + 10
+        # the few reads before, and the proof of the step, count too
+        assert CLEAN_READS - 10 <= measure.requested <= CLEAN_READS
         again = (await found_on(line, reads=200)).sight.measure
         assert again is not None
         assert LEAST_READS <= again.requested < measure.requested
